@@ -1,0 +1,7 @@
+#include <pybind11/pybind11.h>
+
+PYBIND11_MODULE(gpis_native, m) {
+  m.doc() =
+      "Stochastic implicit surfaces: Gaussian processes, their first hits along rays, and light "
+      "transport on them.";
+}
