@@ -1,0 +1,33 @@
+// Path tracing with next-event estimation and multiple importance sampling, over meshes and stochastic surfaces.
+#pragma once
+
+#include "core/counters.h"
+#include "core/rng.h"
+#include "core/vec.h"
+
+namespace gpis {
+
+class Scene;
+
+// One camera sample: radiance and first-hit features. Unset features stay zero, depth infinite.
+struct PathSample {
+  Color radiance;
+  double alpha = 1;
+  double depth = kInfinity;
+  Vec3 normal;
+  Color albedo;
+};
+
+// Per-thread working memory (lines, remembered states): made once per thread, reused by every path.
+class PathTracer {
+ public:
+  explicit PathTracer(const Scene& scene);
+  ~PathTracer();
+  PathSample trace(const Ray& camera_ray, Rng& rng, Counters& counters);
+
+ private:
+  struct Impl;
+  Impl* impl_;
+};
+
+}  // namespace gpis

@@ -1,0 +1,23 @@
+// The model: f = mean + sigma·g, g a zero-mean unit-variance Gaussian process; f > 0 outside, the surface is f = 0 (math.md §1-2).
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "field/field.h"
+#include "kernel/squared_exponential.h"
+
+namespace gpis {
+
+struct GaussianProcess {
+  FieldPtr mean;
+  FieldPtr sigma;  // standard deviation, never variance
+  SquaredExponential kernel;
+  std::optional<Box3> bounds;  // outside there is no surface
+};
+
+// What a ray that leaves a surface point remembers of the process (definitions B1-B3).
+enum class Memory { none, renewal, renewal_plus };
+enum class Sampler { automatic, convolution, dense };
+
+}  // namespace gpis

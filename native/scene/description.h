@@ -1,0 +1,92 @@
+// The scene description: plain structs, filled by the binding from the dict of api.md (or by a native test), turned into a
+// planned Scene (scene/scene.h). World units are metres, colours linear RGB, matrices map to world.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/vec.h"
+#include "process/gaussian_process.h"
+
+namespace gpis {
+
+struct SettingsDescription {
+  std::optional<int> max_bounces;  // none = unlimited
+  double missed_root = 1e-3;       // probability of a missed root per ray
+  enum class Filter { box, blackman_harris } filter = Filter::box;
+  double filter_width = 1;
+  double clamp = 0;  // 0 = off
+  bool light_sampling = true;
+};
+
+struct CameraDescription {
+  enum class Type { perspective, orthographic, equirectangular } type = Type::perspective;
+  Affine matrix;  // camera to world; looks along -z, y up
+  double fov_x = 0.8;
+  double width = 1;            // orthographic: metres across the frame
+  double shift_x = 0, shift_y = 0;  // in units of the frame's larger side, as in Blender
+  double clip_near = 0, clip_far = kInfinity;
+};
+
+struct WorldDescription {
+  Color color;                 // used where there is no image
+  int image_width = 0, image_height = 0;
+  std::vector<float> image;    // (H, W, 3), equirectangular, row 0 at the bottom; empty = constant colour
+  Mat3 matrix;                 // image space -> world
+  double strength = 1;
+};
+
+struct LightDescription {
+  enum class Type { point, spot, sun, area } type = Type::point;
+  std::string name;
+  Affine matrix;               // shines along -z
+  Color color{1, 1, 1};
+  double power = 1;            // W; sun: irradiance, W/m²
+  std::optional<Color> radiance;  // area: instead of power
+  double size_x = 1, size_y = 1;
+  bool ellipse = false;
+  double radius = 0;           // point, spot
+  double angle = 0;            // sun: full angle of its disk; spot: full cone angle
+  double blend = 0;            // spot: soft edge, 0..1
+};
+
+struct MaterialDescription {
+  enum class Type { lambert, mirror, conductor, principled } type = Type::lambert;
+  std::string name;
+  Color color{0.8, 0.8, 0.8};
+  double roughness = 0;        // Beckmann/GGX alpha = roughness² as in Blender
+  double metallic = 0;
+};
+
+struct MeshDescription {
+  std::string name;
+  std::vector<float> vertices;         // (N, 3)
+  std::vector<std::uint32_t> triangles;  // (M, 3)
+  std::vector<float> normals;          // (N, 3) per vertex, or (M, 3, 3) per corner, or empty = flat
+  std::vector<std::int32_t> material_index;  // (M) or empty = 0
+};
+
+struct ObjectDescription {
+  enum class Type { mesh, gpis } type = Type::mesh;
+  std::string name;
+  int mesh = -1;               // index into meshes
+  Affine matrix;
+  std::vector<int> materials;  // indices into materials
+  std::shared_ptr<const GaussianProcess> process;
+  Memory memory = Memory::renewal_plus;
+  Sampler sampler = Sampler::automatic;
+};
+
+struct SceneDescription {
+  SettingsDescription settings;
+  CameraDescription camera;
+  WorldDescription world;
+  std::vector<LightDescription> lights;
+  std::vector<MaterialDescription> materials;
+  std::vector<MeshDescription> meshes;
+  std::vector<ObjectDescription> objects;
+};
+
+}  // namespace gpis
