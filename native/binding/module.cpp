@@ -1,7 +1,10 @@
 #include <pybind11/pybind11.h>
 
+#include "binding/build_info.h"
+
 PYBIND11_MODULE(gpis_native, m) {
   m.doc() =
       "Stochastic implicit surfaces: Gaussian processes, their first hits along rays, and light "
       "transport on them.";
+  gpis::bind_build_info(m);
 }
