@@ -9,7 +9,8 @@ namespace gpis {
 
 class Scene;
 
-// One camera sample: radiance and first-hit features. Unset features stay zero, depth infinite.
+// One camera sample: radiance and first-hit features. Unset features stay zero, depth infinite. Depth is the distance along
+// the camera ray to its first hit; the camera's `clip` reaches the tracer as the ray's origin (near) and t_max (far).
 struct PathSample {
   Color radiance;
   double alpha = 1;
@@ -23,7 +24,7 @@ class PathTracer {
  public:
   explicit PathTracer(const Scene& scene);
   ~PathTracer();
-  PathSample trace(const Ray& camera_ray, Rng& rng, Counters& counters);
+  PathSample trace(const Ray& camera_ray, double t_max, Rng& rng, Counters& counters);
 
  private:
   struct Impl;
