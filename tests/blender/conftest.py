@@ -1,0 +1,82 @@
+"""The Blender tests run twice: in the bpy module, and inside an executable by run_in_blender.py.
+
+Every test file is plain pytest and imports bpy. The add-on is always the installed zip, in a Blender user folder of
+its own, so what is tested is what an artist gets.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+if "bpy" not in sys.modules and "BLENDER_USER_RESOURCES" not in os.environ:
+    # Blender reads it once, at start.
+    os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="gpis-blender-")
+
+import bpy  # noqa: E402
+
+EXTENSION = "bl_ext.user_default.gpis"
+
+
+@pytest.fixture(scope="session")
+def extension_zip():
+    """Path of the zip that `./dev extension` built last."""
+    zips = sorted((ROOT / "dist").glob("gpis-*.zip"), key=lambda path: path.stat().st_mtime)
+    assert zips, "there is no dist/gpis-*.zip; ./dev extension builds it"
+    return zips[-1]
+
+
+@pytest.fixture(scope="session")
+def extension(extension_zip):
+    """The zip, installed and enabled; gives the module's name."""
+    assert "BLENDER_USER_RESOURCES" in os.environ, "start Blender with a BLENDER_USER_RESOURCES of its own"
+    result = bpy.ops.extensions.package_install_files(
+        filepath=str(extension_zip), repo="user_default", enable_on_install=True
+    )
+    assert result == {"FINISHED"}
+    assert EXTENSION in bpy.context.preferences.addons
+    return EXTENSION
+
+
+@pytest.fixture
+def empty_scene(extension):
+    """A scene with nothing in it and the GPIS engine chosen; the extension stays enabled."""
+    bpy.ops.wm.read_homefile(use_factory_startup=False, use_empty=True)
+    bpy.context.scene.render.engine = "GPIS"
+    return bpy.context.scene
+
+
+@pytest.fixture
+def fresh_blender(tmp_path):
+    """Runs a script in a new Blender of the same kind with an empty user folder: fresh_blender(script, *arguments).
+
+    Gives the finished process with its output as text; the script sees the arguments in sys.argv after "--".
+    """
+    resources = tmp_path / "user"
+    resources.mkdir()
+
+    def run(script, *arguments, timeout=300):
+        path = tmp_path / "script.py"
+        path.write_text(script)
+        if bpy.app.module:
+            command = [sys.executable, "-c", f"import bpy, runpy; runpy.run_path({str(path)!r}, run_name='__main__')"]
+        else:
+            command = [bpy.app.binary_path, "-b", "--factory-startup", "--python-exit-code", "1", "--python", path]
+        return subprocess.run(
+            [*map(str, command), "--", *map(str, arguments)],
+            env={**os.environ, "BLENDER_USER_RESOURCES": str(resources)},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=timeout,
+            check=False,
+        )
+
+    yield run
+    shutil.rmtree(resources, ignore_errors=True)

@@ -1,0 +1,94 @@
+"""Settings every test shares: the seed, the size, and an account of what was skipped.
+
+A skipped test proves nothing, so each reason must be on the list expected_skips.txt; others fail the run.
+"""
+
+import os
+import re
+from collections import Counter
+from pathlib import Path
+
+import numpy
+import pytest
+
+EXPECTED = [
+    re.compile(line)
+    for line in (Path(__file__).parent / "expected_skips.txt").read_text().splitlines()
+    if line and not line.startswith("#")
+]
+_reasons = pytest.StashKey[Counter]()
+
+
+@pytest.fixture
+def seed():
+    """The random seed of a statistical test: fixed, but `./dev stats` draws a fresh one."""
+    return int(os.environ.get("GPIS_TEST_SEED", "1"))
+
+
+@pytest.fixture(scope="session")
+def full_size():
+    """True under `./dev stats`: tests that have a small and a full size take the full one."""
+    return bool(os.environ.get("GPIS_TEST_FULL"))
+
+
+class SkipAccount:
+    def __init__(self, config):
+        self.reasons = config.stash[_reasons]
+
+    def pytest_runtest_logreport(self, report):
+        if report.skipped:
+            self.add(report)
+
+    def pytest_collectreport(self, report):
+        if report.skipped:
+            self.add(report)
+
+    def add(self, report):
+        if hasattr(report, "wasxfail"):
+            reason = f"expected failure: {report.wasxfail}"
+        elif isinstance(report.longrepr, tuple):
+            reason = report.longrepr[2].removeprefix("Skipped: ")
+        else:
+            reason = str(report.longrepr)
+        self.reasons[reason] += 1
+
+
+def pytest_report_header():
+    return f"numpy {numpy.__version__}"
+
+
+def _unexpected(config):
+    return [r for r in config.stash[_reasons] if not any(e.search(r) for e in EXPECTED)]
+
+
+def pytest_configure(config):
+    config.stash[_reasons] = Counter()
+    config.pluginmanager.register(SkipAccount(config))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_sessionfinish(session):
+    if _unexpected(session.config) and session.exitstatus == 0:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    reasons, unexpected = config.stash[_reasons], _unexpected(config)
+    terminalreporter.write_line(f"{sum(reasons.values())} skipped")
+    for reason, count in sorted(reasons.items()):
+        verdict = "NOT on the list of expected skips" if reason in unexpected else "expected"
+        terminalreporter.write_line(f"  {count} x {reason} ({verdict})")
+    _leave_result(terminalreporter, unexpected)
+
+
+def _leave_result(terminalreporter, unexpected):
+    """One line for `./dev test`, which shows those of all its pytest runs at the end."""
+    path, label = os.environ.get("GPIS_TEST_RESULTS"), os.environ.get("GPIS_TEST_LABEL")
+    if not path or not label:
+        return
+    line, _ = terminalreporter.build_summary_stats_line()
+    counts = ", ".join(text for text, _ in line) or "no tests"
+    if unexpected:
+        counts += f", {len(unexpected)} reasons to skip that are not expected"
+    with open(path, "a") as file:
+        file.write(f"{label}, numpy {numpy.__version__}: {counts}\n")
