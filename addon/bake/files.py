@@ -1,0 +1,121 @@
+"""Versioned .vdb files: never rewritten in place, moved beside the .blend when it is saved, collected when they are old.
+
+Blender caches a .vdb by its path for the life of the process, so every bake gets a new name (`Suzanne.v0002.vdb`); undo then
+works too, as the path is part of the datablock. A .blend owns one folder, `<its name>_gpis` beside it; volumes whose file
+is elsewhere (a temporary one, or that of the .blend this one was saved from) are copied into it on save, so that no .blend
+depends on the folder of another and each may collect its own.
+"""
+
+import os
+import re
+import shutil
+from pathlib import Path
+
+import bpy
+from bpy.app.handlers import persistent
+
+_VERSIONED = re.compile(r"^(?P<name>.+)\.v(?P<version>\d{4,})\.vdb$")
+# Versions of a name that stay although nothing uses them: Blender's backup (.blend1) still points at the second.
+_KEPT = 2
+# Files made or used since the last load: undo may bring any of them back.
+_session = set()
+
+
+def folder(blend_path):
+    """The folder of a .blend, or a temporary one before the first save."""
+    if not blend_path:
+        return Path(bpy.app.tempdir) / "gpis"
+    path = Path(blend_path)
+    return path.parent / f"{path.stem}_gpis"
+
+
+def new_path(name):
+    """A path that was never used for this name; its folder is made."""
+    place = folder(bpy.data.filepath)
+    place.mkdir(parents=True, exist_ok=True)
+    return _remember(_next(place, bpy.path.clean_name(name) or "gpis"))
+
+
+def _next(place, name):
+    taken = [version for known, version, _ in _versions(place) if known == name]
+    taken += [int(match["version"]) for match in map(_VERSIONED.match, (p.name for p in _session)) if match["name"] == name]
+    return place / f"{name}.v{max(taken, default=0) + 1:04d}.vdb"
+
+
+def _versions(place):
+    """(name, version, path) of every versioned file of a folder."""
+    found = []
+    for path in place.glob("*.vdb") if place.is_dir() else ():
+        match = _VERSIONED.match(path.name)
+        if match:
+            found.append((match["name"], int(match["version"]), path))
+    return found
+
+
+def _remember(path):
+    _session.add(path)
+    return path
+
+
+def _baked():
+    """(volume, path) of every volume of this file whose .vdb was made here."""
+    for volume in bpy.data.volumes:
+        if volume.library is None and volume.gpis_baked and volume.filepath:
+            yield volume, Path(os.path.normpath(bpy.path.abspath(volume.filepath)))
+
+
+def adopt(blend_path):
+    """Copy the volumes' files into the folder of the .blend that is about to be saved."""
+    place = folder(blend_path)
+    for volume, path in _baked():
+        if path.parent == place or not path.is_file():
+            continue
+        place.mkdir(parents=True, exist_ok=True)
+        target = _remember(_next(place, _VERSIONED.match(path.name)["name"]))
+        shutil.copyfile(path, target)
+        # Absolute: Blender makes it relative to the new place while it writes, if the artist wants relative paths.
+        volume.filepath = str(target)
+
+
+def collect():
+    """Delete versions that nothing can point at any more."""
+    if not bpy.data.filepath:
+        return
+    used = {path for _, path in _baked()} | _session
+    newest = {}
+    for name, version, path in sorted(_versions(folder(bpy.data.filepath)), key=lambda row: -row[1]):
+        newest.setdefault(name, []).append(path)
+        if path not in used and path not in newest[name][:_KEPT]:
+            path.unlink()
+
+
+@persistent
+def _before_save(blend_path, _=None):
+    adopt(blend_path or bpy.data.filepath)
+
+
+@persistent
+def _after_save(blend_path, _=None):
+    _session.update(path for _, path in _baked())
+    collect()
+
+
+@persistent
+def _after_load(blend_path, _=None):
+    _session.clear()
+    _session.update(path for _, path in _baked())
+    collect()
+
+
+_HANDLERS = (("save_pre", _before_save), ("save_post", _after_save), ("load_post", _after_load))
+
+
+def register():
+    for name, handler in _HANDLERS:
+        getattr(bpy.app.handlers, name).append(handler)
+
+
+def unregister():
+    for name, handler in _HANDLERS:
+        getattr(bpy.app.handlers, name).remove(handler)
+    _session.clear()

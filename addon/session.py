@@ -1,0 +1,216 @@
+"""One render: rounds of samples on a worker thread, polled from the thread that asked for it. No Blender type in here.
+
+The worker calls the native renderer; its progress callback only reads and writes plain values under a lock, so nothing of
+Blender is ever touched from a thread that Blender does not know.
+"""
+
+import math
+import threading
+import time
+from dataclasses import dataclass, field
+
+# The film's block: 16 consecutive samples are one independent randomisation, slices must be unions of blocks.
+BLOCK = 16
+
+
+@dataclass(frozen=True)
+class Limits:
+    """When a render ends; None means that this does not end it. `noise_threshold` is the square root of the relMSE."""
+
+    samples: int | None = 128
+    time_limit: float | None = None
+    noise_threshold: float | None = None
+    seed: int = 0
+    threads: int = 0
+
+    def __post_init__(self):
+        if self.samples is None and self.time_limit is None and self.noise_threshold is None:
+            raise ValueError("Nothing ends this render: set samples, a time limit or a noise threshold.")
+
+
+@dataclass(frozen=True)
+class Round:
+    """What to do next: `samples` more (None: the render is over, `stop` says why)."""
+
+    samples: int | None
+    time_left: float | None = None
+    stop: str = ""
+
+
+def next_round(limits, samples, seconds, error):
+    """The next round after `samples` in `seconds` with relMSE `error` (None: unknown).
+
+    Rounds double, so that pictures come early and their cost stays a fraction of the render. Noise falls with 1/samples:
+    the last round is cut to what the threshold needs.
+    """
+    if limits.samples is not None and samples >= limits.samples:
+        return Round(None, stop="samples")
+    if samples and limits.time_limit is not None and seconds >= limits.time_limit:
+        return Round(None, stop="time limit")
+    count = max(BLOCK, samples)
+    if limits.noise_threshold is not None and samples and error is not None:
+        if math.sqrt(error) <= limits.noise_threshold:
+            return Round(None, stop="noise threshold")
+        needed = math.ceil(samples * error / limits.noise_threshold**2) - samples
+        count = min(count, needed)
+    # Rounds are whole blocks; only the very last may end inside one.
+    count = max(BLOCK, -(-count // BLOCK) * BLOCK)
+    if limits.samples is not None:
+        count = min(count, limits.samples - samples)
+    time_left = None if limits.time_limit is None else max(limits.time_limit - seconds, 0.001)
+    return Round(count, time_left)
+
+
+@dataclass
+class Progress:
+    """A snapshot for the status line. `fraction` is 0 to 1, `error` the square root of the relMSE left (None: unknown)."""
+
+    fraction: float = 0.0
+    seconds: float = 0.0
+    samples: int = 0
+    error: float | None = None
+    rounds: int = 0
+
+    @property
+    def remaining(self):
+        """Seconds that are left at the pace so far, None before there is a pace."""
+        if self.fraction < 1e-3:
+            return None
+        return self.seconds * (1.0 - self.fraction) / self.fraction
+
+    def text(self):
+        parts = [f"Samples {self.samples}"]
+        if self.remaining is not None:
+            parts.append(f"Remaining {clock(self.remaining)}")
+        if self.error is not None:
+            parts.append(f"Error left {100 * self.error:.1f} %")
+        return " | ".join(parts)
+
+
+def clock(seconds):
+    minutes, seconds = divmod(int(round(seconds)), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{seconds:02d}" if hours else f"{minutes:02d}:{seconds:02d}"
+
+
+@dataclass
+class Session:
+    """Renders `scene` (a native scene) with `renderer` (the native module) until the limits say so or `cancel()`.
+
+    start(), then poll progress() and latest() from the same thread, then finish(), which gives the result or raises what
+    the worker raised. After cancel() the result holds the rounds that were complete, or None.
+    """
+
+    renderer: object
+    scene: object
+    width: int
+    height: int
+    limits: Limits
+    stop: str = field(default="", init=False)  # what ended it
+    history: list = field(default_factory=list, init=False)  # one dict a round: seconds, samples, estimated_error
+
+    def __post_init__(self):
+        self._lock = threading.Lock()
+        self._done = threading.Event()
+        self._cancel = False
+        self._failure = None
+        self._result = None
+        self._progress = Progress()
+        self._samples_needed = 0.0  # for the noise threshold, by the newest estimate
+        self._began = time.monotonic()
+        self._thread = threading.Thread(target=self._work, name="gpis-render", daemon=True)
+
+    def start(self):
+        self._began = time.monotonic()
+        self._thread.start()
+
+    def wait(self, seconds):
+        """Sleep until the render is over, at most `seconds`; True when it is."""
+        return self._done.wait(seconds)
+
+    def cancel(self):
+        with self._lock:
+            self._cancel = True
+
+    def progress(self):
+        with self._lock:
+            snapshot = Progress(**vars(self._progress))
+        snapshot.seconds = time.monotonic() - self._began
+        return snapshot
+
+    def latest(self):
+        """The result of all rounds that are complete, or None."""
+        with self._lock:
+            return self._result
+
+    def finish(self):
+        self._thread.join()
+        if self._failure is not None:
+            raise self._failure
+        return self._result
+
+    def _work(self):
+        try:
+            self._rounds()
+        except BaseException as failure:  # handed to finish(), which raises it in the caller's thread
+            self._failure = failure
+        finally:
+            self._done.set()
+
+    def _rounds(self):
+        samples, error = 0, None
+        while True:
+            seconds = time.monotonic() - self._began
+            step = next_round(self.limits, samples, seconds, error)
+            if step.samples is None:
+                self.stop = step.stop
+                return
+            part = self.renderer.render(
+                self.scene,
+                self.width,
+                self.height,
+                samples=step.samples,
+                time_limit=step.time_left,
+                first_sample=samples,
+                seed=self.limits.seed,
+                threads=self.limits.threads,
+                progress=self._reporter(samples, step.samples),
+            )
+            if self._cancel:
+                self.stop = "cancelled"
+                return
+            result = part if self._result is None else self.renderer.merge([self._result, part])
+            seconds = time.monotonic() - self._began
+            samples = int(result.passes["sample_count"].max())
+            error = result.history[-1]["estimated_error"] if result.history else None
+            with self._lock:
+                self._result = result
+                self.history.append({"seconds": seconds, "samples": samples, "estimated_error": error})
+                if self.limits.noise_threshold is not None and error is not None:
+                    self._samples_needed = samples * error / self.limits.noise_threshold**2
+                fraction = self._fraction(samples)
+                self._progress = Progress(fraction, seconds, samples, _root(error), len(self.history))
+
+    def _reporter(self, first, count):
+        def report(fraction, stats):
+            with self._lock:
+                self._progress.samples = first + int(fraction * count)
+                self._progress.fraction = self._fraction(first + fraction * count)
+                return not self._cancel
+
+        return report
+
+    def _fraction(self, samples):
+        """How far the render is, by the limit that will end it first."""
+        parts = [0.0]
+        if self.limits.samples is not None:
+            parts.append(samples / self.limits.samples)
+        if self.limits.time_limit is not None:
+            parts.append((time.monotonic() - self._began) / self.limits.time_limit)
+        if self._samples_needed > 0:
+            parts.append(samples / self._samples_needed)
+        return min(1.0, max(parts))
+
+
+def _root(error):
+    return None if error is None else math.sqrt(error)

@@ -1,0 +1,52 @@
+"""What the last render did, kept for the panel, the operator and the file beside the image."""
+
+import json
+
+# Name of scene -> record of its last render. Plain values, never Blender's.
+_last = {}
+
+
+def record(scene_name, view_layer_name, frame, session, result, plan, warnings):
+    """Keep and return the record of a render that is over."""
+    height, width = result.passes["combined"].shape[:2]
+    entry = {
+        "scene": scene_name,
+        "view_layer": view_layer_name,
+        "frame": frame,
+        "width": width,
+        "height": height,
+        "stop": session.stop,
+        "history": list(session.history),
+        "stats": plain(result.stats),
+        "plan": plain(plan),
+        "warnings": list(warnings),
+    }
+    _last[scene_name] = entry
+    return entry
+
+
+def last(scene_name):
+    return _last.get(scene_name)
+
+
+def forget():
+    _last.clear()
+
+
+def write(entry, path):
+    with open(path, "w", encoding="utf-8") as file:
+        json.dump(entry, file, indent=1)
+        file.write("\n")
+
+
+def plain(value):
+    """Only what JSON knows: numpy scalars and arrays, tuples and objects' dicts are turned into it."""
+    if isinstance(value, dict):
+        return {str(key): plain(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(entry) for entry in value]
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    if isinstance(value, (str, int, float, bool)) or value is None:
+        return value
+    return str(value)

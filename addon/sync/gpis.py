@@ -1,0 +1,96 @@
+"""GPIS objects: Volume objects with `gpis.enabled` -> a native process and an entry of `objects`."""
+
+import numpy as np
+
+from .. import volume
+from ..native import native
+from . import materials
+from .state import SyncError, array
+
+# Deviations between the surface and the bounds below which a visible part of the surfaces is cut off (one in 740).
+_SAFE_DEVIATIONS = 3.0
+
+
+def add(sync, obj, matrix_world):
+    if not obj.gpis.enabled:
+        sync.warn(f'Volume object "{obj.name}" is left out: switch GPIS on in its Object properties to render it.')
+        return
+    matrix = array(matrix_world)
+    owner = f'GPIS object "{obj.name}"'
+    scale = np.linalg.norm(matrix[:3, :3], axis=0)
+    if abs(np.linalg.det(matrix[:3, :3])) <= 1e-12 * max(scale.max(), 1e-30) ** 3:
+        raise SyncError(f"{owner} is scaled to zero along an axis (scale {_words(scale)}): clear its scale.")
+    try:
+        process = _process(sync, owner, obj)
+    except (ValueError, RuntimeError, OSError) as error:
+        text = str(error)
+        raise SyncError(text if text.startswith(owner) else f"{owner}: {text}") from error
+    names = materials.of_object(sync, obj)
+    if len(names) > 1:
+        sync.warn(f"{owner} has {len(names)} material slots: the first is its micro-BRDF, the others are not used.")
+    sync.description["objects"].append(
+        {
+            "name": obj.name,
+            "type": "gpis",
+            "process": process,
+            "matrix": matrix,
+            "materials": names[:1],
+            "memory": obj.gpis.memory.lower().replace("_plus", "+"),
+        }
+    )
+
+
+def _process(sync, owner, obj):
+    settings = obj.gpis
+    path = volume.path_of(obj.data)
+    grids = {grid["name"]: grid for grid in volume.grids(path)}
+    mean_grid = _grid(owner, "mean", settings.mean_grid, grids, path)
+    gn = native()
+    mean = gn.VdbField(path, settings.mean_grid, meaning="value")
+    if settings.sigma_source == "CONSTANT":
+        if not settings.sigma > 0:
+            raise SyncError(f"{owner}: the standard deviation σ is {settings.sigma:g}, it must be above 0.")
+        sigma = gn.ConstantField(settings.sigma)
+        _warn_if_cut(sync, owner, obj, settings.sigma)
+    else:
+        _grid(owner, "standard deviation", settings.sigma_grid, grids, path)
+        if settings.sigma_meaning == "UNSET":
+            raise SyncError(
+                f'{owner}: say whether grid "{settings.sigma_grid}" holds the standard deviation σ or the variance σ² '
+                "(Object properties, GPIS). Files differ, and names do not tell."
+            )
+        if not settings.sigma_factor > 0:
+            raise SyncError(f"{owner}: the factor on σ is {settings.sigma_factor:g}, it must be above 0.")
+        meaning = "variance" if settings.sigma_meaning == "VARIANCE" else "value"
+        sigma = gn.VdbField(path, settings.sigma_grid, meaning=meaning)
+        if settings.sigma_factor != 1:
+            sigma = settings.sigma_factor * sigma
+    if not settings.length_scale > 0:
+        raise SyncError(f"{owner}: the length scale ℓ is {settings.length_scale:g}, it must be above 0.")
+    kernel = gn.SquaredExponential(settings.length_scale)
+    return gn.GaussianProcess(mean, sigma, kernel, bounds=(mean_grid["min"], mean_grid["max"]))
+
+
+def _grid(owner, what, name, grids, path):
+    if not name:
+        raise SyncError(f"{owner}: choose the grid of the {what} (Object properties, GPIS); {_list(grids)}.")
+    if name not in grids:
+        raise SyncError(f'{owner}: there is no grid "{name}" for the {what} in "{path}"; {_list(grids)}.')
+    return grids[name]
+
+
+def _warn_if_cut(sync, owner, obj, sigma):
+    margin = obj.gpis.bake_margin
+    if obj.gpis.source is not None and 0 < margin < _SAFE_DEVIATIONS * sigma:
+        sync.warn(
+            f"{owner}: σ = {sigma:.3g} reaches beyond the baked margin of {margin:.3g}, the surface is cut off at the bounds. "
+            f"Bake again: the margin then follows σ."
+        )
+
+
+def _list(grids):
+    return "the file holds " + (", ".join(f'"{name}"' for name in sorted(grids)) or "no grids")
+
+
+def _words(vector):
+    return ", ".join(f"{part:.3g}" for part in vector)

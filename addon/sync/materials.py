@@ -1,0 +1,94 @@
+"""Material slots -> `materials` of the description: Diffuse, Glossy and Principled nodes. On a GPIS object this is the
+micro-BRDF, the reflection at the surface of one realisation."""
+
+from . import nodes
+
+# A slot without a material, as Cycles shades it.
+DEFAULT_NAME = "Default Surface"
+DEFAULT = {"type": "lambert", "color": (0.8, 0.8, 0.8)}
+
+# Inputs of Principled that change the picture when they are not zero, by their names in 4.2 to 5.x.
+_IGNORED_INPUTS = (
+    "Subsurface Weight",
+    "Transmission Weight",
+    "Coat Weight",
+    "Sheen Weight",
+    "Emission Strength",
+    "Anisotropic",
+    "Thin Film Thickness",
+)
+
+
+def of_object(sync, obj):
+    """Names of the materials of an object's slots, in their order; one default where there is none."""
+    data_materials = list(obj.data.materials)
+    slots = obj.material_slots
+    # Instances made by geometry nodes carry the materials of their data; their slots are those of the instancer.
+    if len(slots) == len(data_materials):
+        data_materials = [
+            slot.material if slot.link == "OBJECT" else material
+            for slot, material in zip(slots, data_materials, strict=True)
+        ]
+    return [_name(sync, material) for material in data_materials] or [_name(sync, None)]
+
+
+def _name(sync, material):
+    name = DEFAULT_NAME if material is None else material.name_full
+    if name not in sync.description["materials"]:
+        sync.description["materials"][name] = dict(DEFAULT) if material is None else describe(sync, material)
+    return name
+
+
+def describe(sync, material):
+    owner = f'Material "{material.name}"'
+    if not material.use_nodes or material.node_tree is None:
+        return {"type": "lambert", "color": tuple(material.diffuse_color[:3])}  # as Cycles shades it
+    node = nodes.shader_of(material.node_tree)
+    if node is None:
+        sync.warn(f"{owner} has nothing on its Surface: it is rendered black.")
+        return {"type": "lambert", "color": (0.0, 0.0, 0.0)}
+    convert = _CONVERTERS.get(node.type)
+    if convert is None:
+        sync.warn(
+            f'{owner}: node "{node.name}" is not converted, {DEFAULT["color"][0]} grey is used. The GPIS engine reads '
+            "Diffuse BSDF, Glossy BSDF and Principled BSDF."
+        )
+        return dict(DEFAULT)
+    for socket in node.inputs:
+        if socket.name in {"Normal", "Tangent", "Coat Normal"} and socket.is_linked:
+            sync.warn(f'{owner}: the link on {socket.name} of node "{node.name}" is not converted.')
+    return convert(sync, owner, node)
+
+
+def _diffuse(sync, owner, node):
+    if nodes.value(sync, owner, node.inputs["Roughness"]) > 0:
+        sync.warn(f'{owner}: node "{node.name}" is rendered without its roughness (Lambert instead of Oren-Nayar).')
+    return {"type": "lambert", "color": nodes.value(sync, owner, node.inputs["Color"])}
+
+
+def _glossy(sync, owner, node):
+    color = nodes.value(sync, owner, node.inputs["Color"])
+    roughness = nodes.value(sync, owner, node.inputs["Roughness"])
+    if abs(nodes.value(sync, owner, node.inputs["Anisotropy"])) > 0:
+        sync.warn(f'{owner}: node "{node.name}" is rendered without its anisotropy.')
+    if roughness == 0:
+        return {"type": "mirror", "color": color}
+    return {"type": "conductor", "color": color, "roughness": roughness}
+
+
+def _principled_node(sync, owner, node):
+    for name in _IGNORED_INPUTS:
+        socket = node.inputs.get(name)
+        if socket is not None and (socket.is_linked or socket.default_value != 0):
+            sync.warn(f'{owner}: {name} of node "{node.name}" is not converted.')
+    if nodes.value(sync, owner, node.inputs["Alpha"]) < 1:
+        sync.warn(f'{owner}: Alpha of node "{node.name}" is not converted, the surface is opaque.')
+    return {
+        "type": "principled",
+        "color": nodes.value(sync, owner, node.inputs["Base Color"]),
+        "roughness": nodes.value(sync, owner, node.inputs["Roughness"]),
+        "metallic": nodes.value(sync, owner, node.inputs["Metallic"]),
+    }
+
+
+_CONVERTERS = {"BSDF_DIFFUSE": _diffuse, "BSDF_GLOSSY": _glossy, "BSDF_PRINCIPLED": _principled_node}

@@ -1,0 +1,130 @@
+"""Render tab: Sampling, Light Paths, Film, Statistics."""
+
+import math
+
+import bpy
+
+from .. import statistics
+from ..session import clock
+
+ENGINE = "GPIS"
+
+
+class _RenderPanel:
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "render"
+    COMPAT_ENGINES = {ENGINE}
+
+    @classmethod
+    def poll(cls, context):
+        return context.engine in cls.COMPAT_ENGINES
+
+    def draw(self, context):
+        self.layout.use_property_split = True
+        self.layout.use_property_decorate = False
+        self.content(self.layout, context.scene)
+
+
+class GPIS_PT_sampling(_RenderPanel, bpy.types.Panel):
+    bl_label = "Sampling"
+
+    def content(self, layout, scene):
+        gpis = scene.gpis
+        _switched(layout, gpis, "use_samples", "samples", "Samples")
+        _switched(layout, gpis, "use_noise_threshold", "noise_threshold", "Noise Threshold")
+        layout.prop(gpis, "time_limit")
+        if not (gpis.use_samples or gpis.use_noise_threshold or gpis.time_limit):
+            layout.label(text="Nothing ends this render", icon="ERROR")
+        layout.prop(gpis, "seed")
+        column = layout.column()
+        column.prop(scene.render, "threads_mode", text="Threads")
+        if scene.render.threads_mode == "FIXED":
+            column.prop(scene.render, "threads", text="Number")
+
+
+class GPIS_PT_light_paths(_RenderPanel, bpy.types.Panel):
+    bl_label = "Light Paths"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def content(self, layout, scene):
+        gpis = scene.gpis
+        _switched(layout, gpis, "use_max_bounces", "max_bounces", "Bounces")
+        layout.prop(gpis, "light_sampling")
+        layout.prop(gpis, "missed_root")
+        layout.prop(gpis, "clamp")
+
+
+class GPIS_PT_film(_RenderPanel, bpy.types.Panel):
+    bl_label = "Film"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def content(self, layout, scene):
+        layout.prop(scene.gpis, "filter_type")
+        layout.prop(scene.gpis, "filter_width")
+
+
+class GPIS_PT_statistics(_RenderPanel, bpy.types.Panel):
+    bl_label = "Statistics"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def content(self, layout, scene):
+        layout.prop(scene.gpis, "write_statistics")
+        entry = statistics.last(scene.name)
+        if entry is None:
+            layout.label(text="No render yet")
+            return
+        column = layout.column(align=True)
+        if entry["history"]:
+            end = entry["history"][-1]
+            _row(column, "Frame", f"{entry['frame']}, {entry['view_layer']}, {entry['width']} × {entry['height']}")
+            _row(column, "Samples", f"{end['samples']} in {clock(end['seconds'])} (ended by: {entry['stop']})")
+            if end["estimated_error"] is not None:
+                _row(column, "Error left", f"{100 * math.sqrt(end['estimated_error']):.2f} %")
+        for name, value in entry["stats"].items():
+            if value:
+                _row(column, name.replace("_", " "), f"{value:,}" if isinstance(value, int) else str(value))
+        layout.operator("gpis.save_statistics", icon="EXPORT")
+
+
+class GPIS_PT_plan(_RenderPanel, bpy.types.Panel):
+    bl_label = "Plan"
+    bl_parent_id = "GPIS_PT_statistics"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and statistics.last(context.scene.name) is not None
+
+    def content(self, layout, scene):
+        column = layout.column(align=True)
+        for name, sentence in statistics.last(scene.name)["plan"].items():
+            _row(column, name, str(sentence))
+
+
+def _switched(layout, owner, switch, name, text):
+    row = layout.row(heading=text)
+    row.prop(owner, switch, text="")
+    value = row.row()
+    value.active = getattr(owner, switch)
+    value.prop(owner, name, text="")
+
+
+def _row(column, name, text):
+    split = column.split(factor=0.4)
+    split.alignment = "RIGHT"
+    split.label(text=name)
+    split.label(text=text)
+
+
+_CLASSES = (GPIS_PT_sampling, GPIS_PT_light_paths, GPIS_PT_film, GPIS_PT_statistics, GPIS_PT_plan)
+
+
+def register():
+    for cls in _CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister():
+    for cls in reversed(_CLASSES):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,50 @@
+"""Volume datablocks and their .vdb files: where the file is, which grids it holds."""
+
+import os
+
+import bpy
+
+from .native import native
+
+# (path, time of change, size) -> list of grids: panels ask at every redraw.
+_grids = {}
+
+
+def path_of(data):
+    """Absolute path of a Volume's file at the current frame; ValueError or FileNotFoundError with a sentence."""
+    if not data.filepath:
+        raise ValueError(f'Volume "{data.name}" has no file: choose a .vdb in its Object Data properties.')
+    path = bpy.path.abspath(data.filepath, library=data.library)
+    if data.is_sequence:
+        data.grids.load()  # Blender's own rule of which file a frame has
+        path = bpy.path.abspath(data.grids.frame_filepath, library=data.library)
+    path = os.path.normpath(path)
+    if not os.path.isfile(path):
+        hint = " It is packed: unpack it (File, External Data)." if data.packed_file else ""
+        raise FileNotFoundError(f'the file "{path}" of volume "{data.name}" is not there.{hint}')
+    return path
+
+
+def grids(path):
+    """The float grids of a .vdb: dicts of name, type, min, max, voxel_size, value_range."""
+    stat = os.stat(path)
+    key = (path, stat.st_mtime_ns, stat.st_size)
+    if key not in _grids:
+        _grids[key] = native().vdb_grids(path)
+    return _grids[key]
+
+
+def grid_names(data):
+    """Names for the lists of a panel: empty where the file cannot be read (the panel says why)."""
+    try:
+        return [grid["name"] for grid in grids(path_of(data))]
+    except (ValueError, OSError, RuntimeError):
+        return []
+
+
+def size(path, name):
+    """Longest side of a grid's bounds in object units."""
+    for grid in grids(path):
+        if grid["name"] == name:
+            return max(high - low for low, high in zip(grid["min"], grid["max"], strict=True))
+    raise ValueError(f'There is no grid "{name}" in "{path}".')
