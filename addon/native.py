@@ -1,6 +1,7 @@
 """The native module, imported when it is first used and nowhere else.
 
-It shares libraries with Blender (TBB by its soname), and whichever loads first serves both: Blender's must be there first.
+It shares libraries with Blender (TBB by its soname), and whichever loads first serves both: Blender's must be there
+first.
 """
 
 import sys

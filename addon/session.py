@@ -1,7 +1,7 @@
-"""One render: rounds of samples on a worker thread, polled from the thread that asked for it. No Blender type in here.
+"""One render: rounds of samples on a worker thread, polled by the thread that asked for it. No Blender type in here.
 
-The worker calls the native renderer; its progress callback only reads and writes plain values under a lock, so nothing of
-Blender is ever touched from a thread that Blender does not know.
+The worker calls the native renderer; its progress callback only reads and writes plain values under a lock, so
+nothing of Blender is ever touched from a thread that Blender does not know.
 """
 
 import math
@@ -40,8 +40,8 @@ class Round:
 def next_round(limits, samples, seconds, error):
     """The next round after `samples` in `seconds` with relMSE `error` (None: unknown).
 
-    Rounds double, so that pictures come early and their cost stays a fraction of the render. Noise falls with 1/samples:
-    the last round is cut to what the threshold needs.
+    Rounds double, so that pictures come early and their cost stays a fraction of the render. Noise falls with
+    1/samples: the last round is cut to what the threshold needs.
     """
     if limits.samples is not None and samples >= limits.samples:
         return Round(None, stop="samples")
@@ -63,7 +63,7 @@ def next_round(limits, samples, seconds, error):
 
 @dataclass
 class Progress:
-    """A snapshot for the status line. `fraction` is 0 to 1, `error` the square root of the relMSE left (None: unknown)."""
+    """A snapshot for the status line: `fraction` is 0 to 1, `error` the square root of the relMSE left, if known."""
 
     fraction: float = 0.0
     seconds: float = 0.0
@@ -97,8 +97,8 @@ def clock(seconds):
 class Session:
     """Renders `scene` (a native scene) with `renderer` (the native module) until the limits say so or `cancel()`.
 
-    start(), then poll progress() and latest() from the same thread, then finish(), which gives the result or raises what
-    the worker raised. After cancel() the result holds the rounds that were complete, or None.
+    start(), then poll progress() and latest() from the same thread, then finish(), which gives the result or raises
+    what the worker raised. After cancel() the result holds the rounds that were complete, or None.
     """
 
     renderer: object

@@ -1,9 +1,9 @@
-"""Versioned .vdb files: never rewritten in place, moved beside the .blend when it is saved, collected when they are old.
+"""Versioned .vdb files: never rewritten, copied beside the .blend when it is saved, collected when they are old.
 
-Blender caches a .vdb by its path for the life of the process, so every bake gets a new name (`Suzanne.v0002.vdb`); undo then
-works too, as the path is part of the datablock. A .blend owns one folder, `<its name>_gpis` beside it; volumes whose file
-is elsewhere (a temporary one, or that of the .blend this one was saved from) are copied into it on save, so that no .blend
-depends on the folder of another and each may collect its own.
+Blender caches a .vdb by its path for the life of the process, so every bake gets a new name (`Suzanne.v0002.vdb`);
+undo then works too, as the path is part of the datablock. A .blend owns one folder, `<its name>_gpis` beside it;
+volumes whose file is elsewhere (a temporary one, or that of the .blend this one was saved from) are copied into it on
+save, so that no .blend depends on the folder of another and each may collect its own.
 """
 
 import os
@@ -38,7 +38,10 @@ def new_path(name):
 
 def _next(place, name):
     taken = [version for known, version, _ in _versions(place) if known == name]
-    taken += [int(match["version"]) for match in map(_VERSIONED.match, (p.name for p in _session)) if match["name"] == name]
+    for path in _session:
+        match = _VERSIONED.match(path.name)
+        if match["name"] == name:
+            taken.append(int(match["version"]))
     return place / f"{name}.v{max(taken, default=0) + 1:04d}.vdb"
 
 
@@ -60,8 +63,10 @@ def _remember(path):
 def _baked():
     """(volume, path) of every volume of this file whose .vdb was made here."""
     for volume in bpy.data.volumes:
-        if volume.library is None and volume.gpis_baked and volume.filepath:
-            yield volume, Path(os.path.normpath(bpy.path.abspath(volume.filepath)))
+        path = Path(os.path.normpath(bpy.path.abspath(volume.filepath)))
+        # A file that was chosen by hand afterwards is not ours.
+        if volume.library is None and volume.gpis_baked and _VERSIONED.match(path.name):
+            yield volume, path
 
 
 def adopt(blend_path):
@@ -83,7 +88,7 @@ def collect():
         return
     used = {path for _, path in _baked()} | _session
     newest = {}
-    for name, version, path in sorted(_versions(folder(bpy.data.filepath)), key=lambda row: -row[1]):
+    for name, _version, path in sorted(_versions(folder(bpy.data.filepath)), key=lambda row: -row[1]):
         newest.setdefault(name, []).append(path)
         if path not in used and path not in newest[name][:_KEPT]:
             path.unlink()

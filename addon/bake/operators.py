@@ -78,8 +78,8 @@ def make(context, source, *, resolution, margin=0.0):
     volume_object = bpy.data.objects.new(f"{source.name} GPIS", data)
     for collection in source.users_collection:
         collection.objects.link(volume_object)
-    # A child with no transform of its own: animation, constraints and parents of the mesh keep working, and deleting the
-    # GPIS leaves the mesh where it is.
+    # A child with no transform of its own: animation, constraints and parents of the mesh keep working, and deleting
+    # the GPIS leaves the mesh where it is.
     volume_object.parent = source
     context.view_layer.update()
     volume_object.gpis.source = source
@@ -120,7 +120,7 @@ class _Bake:
     )
     margin: FloatProperty(
         name="Margin",
-        description="Room around the mesh for the surface to wander in, in object units (0: 4 σ, at least a tenth of the size)",
+        description="Room around the mesh for the surface, in object units (0: 4 σ, at least a tenth of the size)",
         default=0.0,
         min=0.0,
         subtype="DISTANCE",

@@ -1,7 +1,7 @@
 """Blender's evaluated scene -> the scene description of the native renderer (a plain dict), one file per kind.
 
-Whatever cannot be expressed is said: a sentence in `Sync.warnings` where the picture is still what an artist would accept,
-a SyncError where it is not.
+Whatever cannot be expressed is said: a sentence in `Sync.warnings` where the picture is still what an artist would
+accept, a SyncError where it is not.
 """
 
 import re

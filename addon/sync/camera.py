@@ -1,7 +1,7 @@
 """The camera -> `camera` of the description.
 
-Focal length, sensor, sensor fit and shift all end in Blender's projection matrix; the description's few numbers are read
-back from it, so no rule of Blender's is written a second time here.
+Focal length, sensor, sensor fit and shift all end in Blender's projection matrix; the description's few numbers are
+read back from it, so no rule of Blender's is written a second time here.
 """
 
 import math
@@ -20,7 +20,8 @@ def describe(sync, width, height):
     data = camera.data
     if data.type not in {"PERSP", "ORTHO"}:
         raise SyncError(
-            f'Camera "{camera.name}" is of type {data.type}: the GPIS engine renders perspective and orthographic cameras.'
+            f'Camera "{camera.name}" is of type {data.type}: the GPIS engine renders perspective and '
+            "orthographic cameras."
         )
     if sync.scene.render.use_multiview:
         raise SyncError("Stereoscopy is switched on: the GPIS engine renders one view. Switch it off in Output.")
@@ -31,8 +32,8 @@ def describe(sync, width, height):
     aspect = render.pixel_aspect_x / render.pixel_aspect_y
     if abs(aspect - 1) > 1e-6:
         raise SyncError(
-            f"The pixel aspect is {render.pixel_aspect_x:g} to {render.pixel_aspect_y:g}: the GPIS engine renders square "
-            "pixels. Set both to 1 in Output."
+            f"The pixel aspect is {render.pixel_aspect_x:g} to {render.pixel_aspect_y:g}: the GPIS engine renders "
+            "square pixels. Set both to 1 in Output."
         )
     full_width, full_height = frame_size(sync.scene)
     projection = array(camera.calc_matrix_camera(sync.depsgraph, x=full_width, y=full_height, scale_x=1, scale_y=1))

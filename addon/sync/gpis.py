@@ -83,8 +83,8 @@ def _warn_if_cut(sync, owner, obj, sigma):
     margin = obj.gpis.bake_margin
     if obj.gpis.source is not None and 0 < margin < _SAFE_DEVIATIONS * sigma:
         sync.warn(
-            f"{owner}: σ = {sigma:.3g} reaches beyond the baked margin of {margin:.3g}, the surface is cut off at the bounds. "
-            f"Bake again: the margin then follows σ."
+            f"{owner}: σ = {sigma:.3g} reaches beyond the baked margin of {margin:.3g}, the surface is cut off at "
+            "the bounds. Bake again: the margin then follows σ."
         )
 
 

@@ -1,4 +1,6 @@
-"""Evaluated meshes (modifiers applied; curves and text arrive as meshes too) and their instances -> `meshes`, `objects`."""
+"""Evaluated meshes (modifiers applied; curves and text arrive as meshes too) and their instances -> `meshes`,
+`objects`.
+"""
 
 import numpy as np
 

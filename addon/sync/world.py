@@ -25,8 +25,8 @@ def describe(sync):
     if texture is None or texture.type != "TEX_ENVIRONMENT":
         if texture is not None and texture.type == "TEX_SKY":
             sync.warn(
-                f"{owner}: the Sky Texture is not converted. Bake it to an equirectangular image and use an Environment "
-                "Texture with a sun light."
+                f"{owner}: the Sky Texture is not converted. Bake it to an equirectangular image and use an "
+                "Environment Texture with a sun light."
             )
         return {"color": nodes.value(sync, owner, background.inputs["Color"]), "strength": strength}
     return {
@@ -85,8 +85,8 @@ def _is_generated(node, texture):
 
 def _rotation(sync, owner, node):
     for name, plain in (("Location", 0.0), ("Scale", 1.0)):
-        socket = node.inputs.get(name)
-        if socket is not None and socket.enabled and (socket.is_linked or any(part != plain for part in socket.default_value)):
+        socket = node.inputs[name]
+        if socket.enabled and (socket.is_linked or any(part != plain for part in socket.default_value)):
             sync.warn(f'{owner}: {name} of node "{node.name}" is not converted, only its Rotation is.')
     socket = node.inputs["Rotation"]
     if socket.is_linked:

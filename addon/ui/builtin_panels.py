@@ -1,5 +1,6 @@
-"""Blender's own panels that fit this engine, taken as Cycles takes them: all that every engine had, minus a list, plus the
-material, world and light panels that Blender shows for EEVEE alone."""
+"""Blender's own panels that fit this engine, taken as Cycles takes them: all that every engine had, minus a list,
+plus the material, world and light panels that Blender shows for EEVEE alone.
+"""
 
 import bpy
 

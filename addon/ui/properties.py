@@ -27,7 +27,7 @@ class GPIS_SceneProperties(bpy.types.PropertyGroup):
     )
     noise_threshold: FloatProperty(
         name="Noise Threshold",
-        description="Error left at which the render ends: the square root of the mean relative squared error of a pixel",
+        description="Error left at which the render ends: square root of the mean relative squared error of a pixel",
         default=0.05,
         min=1e-4,
         soft_max=0.5,
@@ -44,7 +44,7 @@ class GPIS_SceneProperties(bpy.types.PropertyGroup):
     )
     light_sampling: BoolProperty(
         name="Light Sampling",
-        description="Send a ray towards the lights at every bounce. Off, lights are only met by chance: for comparisons",
+        description="Send a ray towards the lights at every bounce. Off, they are only met by chance: for comparisons",
         default=True,
     )
     missed_root: FloatProperty(
@@ -57,7 +57,7 @@ class GPIS_SceneProperties(bpy.types.PropertyGroup):
     )
     clamp: FloatProperty(
         name="Clamp",
-        description="Largest contribution of a light path (0: off). It darkens the picture where it removes bright specks",
+        description="Largest contribution of a light path (0: off). Darkens the picture where it removes bright specks",
         default=0.0,
         min=0.0,
     )
@@ -142,7 +142,9 @@ class GPIS_ObjectProperties(bpy.types.PropertyGroup):
         step=1,
         subtype="DISTANCE",
     )
-    sigma_grid: StringProperty(name="Grid", description="Grid of the standard deviation or variance", search=_grid_names)
+    sigma_grid: StringProperty(
+        name="Grid", description="Grid of the standard deviation or variance", search=_grid_names
+    )
     sigma_meaning: EnumProperty(
         name="Holds",
         description="What the numbers of the grid are. Files differ, and the name of a grid does not tell",
