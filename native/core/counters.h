@@ -17,6 +17,7 @@
   X(line_splits, "steps divided because a root could hide in them")                        \
   X(line_step_limit, "lines ended by the bound on steps per ray")                          \
   X(line_entry_inside, "lines found inside on re-entry after a skip")                      \
+  X(line_slope_floor, "starts or hits whose slope had the wrong sign by rounding")         \
   X(line_split_limit, "steps no longer divided: narrower than the tolerance")              \
   X(factorisations, "covariance matrices factorised")                                      \
   X(field_lookups, "evaluations of mean or deviation fields")                              \

@@ -33,13 +33,16 @@ struct Start {
 };
 
 // Gradient at a point of a line, given the line sample (t, ∂_d f): ∇f = mean + ξ₁ b1 + ξ₂ b2, ξ iid N(0,1), world space.
-// b1, b2 are orthogonal to the ray direction in the sense b·d = 0, so every draw has the same ∂_d f. Both are zero where the
-// gradient is determined (σ = 0, or a remembered gradient over a very short flight: `degenerate`, B10).
+// b1, b2 are orthogonal to the ray direction in the sense b·d = 0, so every draw has the same ∂_d f. `degenerate`: the
+// gradient is (all but) determined, σ = 0 or a remembered gradient over a very short flight; no density is to be used (B10).
 struct GradientLaw {
   Vec3 mean, b1, b2;
   bool degenerate = false;
 
-  Vec3 draw(Rng& rng) const { return degenerate ? mean : mean + b1 * rng.normal() + b2 * rng.normal(); }
+  Vec3 draw(Rng& rng) const {
+    const double xi1 = rng.normal(), xi2 = rng.normal();
+    return mean + b1 * xi1 + b2 * xi2;
+  }
 };
 
 // One ray through one process. Reused from ray to ray (keeps its buffers); `first_hit` starts a new sample path.

@@ -1,0 +1,292 @@
+// Kernels, the Gaussian process, and its first hits.
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <set>
+
+#include "binding/arguments.h"
+#include "binding/bindings.h"
+#include "process/first_hits.h"
+#include "process/surface.h"
+
+namespace gpis {
+namespace py = pybind11;
+using namespace py::literals;
+namespace {
+
+using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+std::vector<Vec3> points_argument(const py::handle& value, const char* name) {
+  const Array a = Array::ensure(value);
+  if (!a || a.ndim() != 2 || a.shape(1) != 3) {
+    PyErr_Clear();
+    throw std::invalid_argument(std::string(name) + " must be an array of shape (N, 3).");
+  }
+  std::vector<Vec3> points(a.shape(0));
+  for (py::ssize_t i = 0; i < a.shape(0); ++i) {
+    points[i] = {a.at(i, 0), a.at(i, 1), a.at(i, 2)};
+    if (!is_finite(points[i]))
+      throw std::invalid_argument(std::string(name) + "[" + std::to_string(i) +
+                                  "] is not finite: every coordinate must be a number.");
+  }
+  return points;
+}
+
+SquaredExponential make_kernel(const py::object& length_scale, const py::object& rotation) {
+  Vec3 l;
+  if (py::isinstance<py::sequence>(length_scale) || py::isinstance<py::array>(length_scale)) {
+    const auto v = length_scale.cast<std::vector<double>>();
+    if (v.size() != 3)
+      throw std::invalid_argument("length_scale must be a number or three numbers, it has " +
+                                  std::to_string(v.size()) + ".");
+    l = {v[0], v[1], v[2]};
+  } else {
+    const double v = length_scale.cast<double>();
+    l = {v, v, v};
+  }
+  Mat3 axes;
+  if (!rotation.is_none()) {
+    const auto q = rotation.cast<std::vector<double>>();
+    if (q.size() != 4) throw std::invalid_argument("rotation must be a quaternion (w, x, y, z).");
+    const double n = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    if (!(n > 0) || !std::isfinite(n)) throw std::invalid_argument("rotation must be a quaternion that is not zero.");
+    const double w = q[0] / n, x = q[1] / n, y = q[2] / n, z = q[3] / n;
+    axes = {{Vec3{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
+             Vec3{2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
+             Vec3{2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}}};
+  }
+  return SquaredExponential(l, axes);
+}
+
+Eigen::MatrixXd covariance_matrix(const GaussianProcess& gp, const std::vector<Vec3>& x, const std::vector<Vec3>& y) {
+  Eigen::MatrixXd k(x.size(), y.size());
+  for (std::size_t i = 0; i < x.size(); ++i)
+    for (std::size_t j = 0; j < y.size(); ++j)
+      k(i, j) = gp.sigma->value(x[i]) * gp.sigma->value(y[j]) * gp.kernel.covariance(x[i], y[j]);
+  return k;
+}
+
+Array to_array(const Eigen::MatrixXd& m) {
+  Array out({m.rows(), m.cols()});
+  for (Eigen::Index i = 0; i < m.rows(); ++i)
+    for (Eigen::Index j = 0; j < m.cols(); ++j) out.mutable_at(i, j) = m(i, j);
+  return out;
+}
+
+Array sample(const GaussianProcess& gp, const py::object& at, py::ssize_t n, std::uint64_t seed) {
+  const auto x = points_argument(at, "points");
+  if (x.size() > 4096)
+    throw std::invalid_argument("sample draws at up to 4096 points jointly, these are " + std::to_string(x.size()) + ".");
+  if (n < 0) throw std::invalid_argument("n must not be negative.");
+  // Eigenvectors, not Cholesky: the matrix is singular to rounding wherever points are near (math.md §5, traps).
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance_matrix(gp, x, x));
+  const Eigen::MatrixXd factor = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+  Eigen::MatrixXd out(n, x.size());
+  Eigen::VectorXd mean(x.size()), xi(x.size());
+  for (std::size_t i = 0; i < x.size(); ++i) mean[i] = gp.mean->value(x[i]);
+  for (py::ssize_t row = 0; row < n; ++row) {
+    Rng rng(seed, row);
+    for (auto& v : xi) v = rng.normal();
+    out.row(row) = mean + factor * xi;
+  }
+  return to_array(out);
+}
+
+Sampler sampler_argument(const std::string& name) {
+  if (name == "auto") return Sampler::automatic;
+  if (name == "convolution") return Sampler::convolution;
+  if (name == "dense") return Sampler::dense;
+  throw std::invalid_argument("sampler is '" + name + "', it takes 'auto', 'convolution' or 'dense'.");
+}
+
+FirstHitsQuery query_argument(const py::object& origins, const py::object& directions, double t_max,
+                              const py::object& start, std::uint64_t first_index, std::uint64_t seed, int threads) {
+  FirstHitsQuery query;
+  const auto o = points_argument(origins, "origins"), d = points_argument(directions, "directions");
+  if (o.size() != d.size())
+    throw std::invalid_argument("origins and directions must have as many rows, they have " +
+                                std::to_string(o.size()) + " and " + std::to_string(d.size()) + ".");
+  for (std::size_t i = 0; i < o.size(); ++i) {
+    if (std::abs(length(d[i]) - 1) > 1e-6)
+      throw std::invalid_argument("directions[" + std::to_string(i) + "] must have length 1, it has " +
+                                  std::to_string(length(d[i])) + ".");
+    query.rays.push_back({o[i], d[i]});
+  }
+  if (!(t_max > 0)) throw std::invalid_argument("t_max must be positive, it is " + std::to_string(t_max) + ".");
+  if (threads < 0) throw std::invalid_argument("threads must not be negative (0 = all cores).");
+  if (!start.is_none()) {
+    const py::dict s = start.cast<py::dict>();
+    for (const auto& item : s) {
+      const auto key = item.first.cast<std::string>();
+      if (key != "value" && key != "gradient")
+        throw std::invalid_argument("start: unknown key '" + key + "' (takes value, gradient).");
+    }
+    if (!s.contains("value") || !s.contains("gradient"))
+      throw std::invalid_argument("start must hold value (N,) and gradient (N, 3).");
+    const Array value = Array::ensure(s["value"]);
+    const auto gradient = points_argument(s["gradient"], "start['gradient']");
+    if (!value || value.ndim() != 1 || static_cast<std::size_t>(value.shape(0)) != o.size() || gradient.size() != o.size())
+      throw std::invalid_argument("start must hold value (N,) and gradient (N, 3), one row a ray.");
+    for (std::size_t i = 0; i < o.size(); ++i) {
+      if (!(value.at(i) >= 0))
+        throw std::invalid_argument("start['value'][" + std::to_string(i) + "] must be 0 (on the surface) or positive (outside).");
+      query.start.push_back({value.at(i), gradient[i]});
+    }
+  }
+  query.t_max = t_max;
+  query.first_index = first_index;
+  query.seed = seed;
+  query.threads = threads;
+  return query;
+}
+
+py::dict first_hits_dict(const std::shared_ptr<GaussianProcess>& gp, const py::object& origins, const py::object& directions,
+                         double t_max, const std::string& memory, const py::object& start, std::uint64_t first_index,
+                         const std::string& sampler, double tolerance, std::uint64_t seed, int threads) {
+  const FirstHitsQuery query = query_argument(origins, directions, t_max, start, first_index, seed, threads);
+  const ProcessSurface surface(gp, {}, memory_argument(memory, "memory"), sampler_argument(sampler), tolerance);
+  FirstHits hits;
+  {
+    py::gil_scoped_release release;
+    hits = first_hits(surface, query);
+  }
+  const py::ssize_t n = query.rays.size();
+  Array t(n), position({n, py::ssize_t{3}}), gradient({n, py::ssize_t{3}}), value(n);
+  py::array_t<std::int32_t> part(n);
+  for (py::ssize_t i = 0; i < n; ++i) {
+    t.mutable_at(i) = hits.t[i];
+    value.mutable_at(i) = hits.state[i].value;
+    part.mutable_at(i) = std::isinf(hits.t[i]) ? -1 : 0;
+    const Vec3 p = std::isinf(hits.t[i]) ? hits.state[i].gradient : query.rays[i].at(hits.t[i]);
+    for (int k = 0; k < 3; ++k) {
+      position.mutable_at(i, k) = p[k];
+      gradient.mutable_at(i, k) = hits.state[i].gradient[k];
+    }
+  }
+  return py::dict("t"_a = t, "position"_a = position, "gradient"_a = gradient, "part"_a = part,
+                  "state"_a = py::dict("value"_a = value, "gradient"_a = gradient),
+                  "counters"_a = counters_dict(hits.counters));
+}
+
+Array line_values_array(const std::shared_ptr<GaussianProcess>& gp, const py::object& origins, const py::object& directions,
+                        const std::vector<double>& t, const std::string& memory, const py::object& start,
+                        std::uint64_t first_index, const std::string& sampler, double tolerance, std::uint64_t seed,
+                        int threads) {
+  if (t.empty()) throw std::invalid_argument("t must hold at least one distance.");
+  const double t_max = *std::max_element(t.begin(), t.end());
+  const FirstHitsQuery query = query_argument(origins, directions, t_max, start, first_index, seed, threads);
+  const ProcessSurface surface(gp, {}, memory_argument(memory, "memory"), sampler_argument(sampler), tolerance);
+  std::vector<double> values;
+  {
+    py::gil_scoped_release release;
+    values = line_values(surface, query, t);
+  }
+  Array out({static_cast<py::ssize_t>(query.rays.size()), static_cast<py::ssize_t>(t.size())});
+  std::copy(values.begin(), values.end(), out.mutable_data());
+  return out;
+}
+
+}  // namespace
+
+void bind_process(py::module_& m) {
+  py::class_<SquaredExponential>(m, "SquaredExponential",
+                                 "Squared-exponential correlation exp(-q²/2), q² = rᵀA⁻¹r.\n\n"
+                                 "length_scale: number or (3,), in the unit of the process's space; rotation: quaternion\n"
+                                 "(w, x, y, z) that turns the axes of the length scales. Seyb et al. 2024.")
+      .def(py::init(&make_kernel), "length_scale"_a, py::kw_only(), "rotation"_a = py::none())
+      .def_property_readonly("variance", [](const SquaredExponential&) { return 1.0; })
+      .def(
+          "__call__",
+          [](const SquaredExponential& k, const py::object& x, const py::object& y) {
+            const auto a = points_argument(x, "x"), b = points_argument(y, "y");
+            Array out({a.size(), b.size()});
+            for (std::size_t i = 0; i < a.size(); ++i)
+              for (std::size_t j = 0; j < b.size(); ++j) out.mutable_at(i, j) = k.covariance(a[i], b[j]);
+            return out;
+          },
+          "x"_a, "y"_a, "Correlation of g between points x (N, 3) and y (M, 3): (N, M).")
+      .def(
+          "derivative_variance",
+          [](const SquaredExponential& k, const py::object& direction) {
+            const auto d = direction.cast<std::vector<double>>();
+            if (d.size() != 3) throw std::invalid_argument("direction must hold three numbers.");
+            const Vec3 w = k.whitening() * Vec3{d[0], d[1], d[2]};
+            return dot(w, w);
+          },
+          "direction"_a, "Variance of the derivative of g along `direction` (3,): dᵀA⁻¹d.");
+
+  py::class_<GaussianProcess, std::shared_ptr<GaussianProcess>>(
+      m, "GaussianProcess",
+      "f = mean + sigma·g: outside where f > 0, the surface is f = 0.\n\n"
+      "mean, sigma: field or number; sigma is the standard deviation, in the unit of the mean, not negative.\n"
+      "kernel: correlation of g. bounds: (min (3,), max (3,)); outside there is no surface. A mean on a grid bounds the\n"
+      "process to its nodes.")
+      .def(py::init([](const py::object& mean, const py::object& sigma, const SquaredExponential& kernel,
+                       const py::object& bounds) {
+             auto gp = std::make_shared<GaussianProcess>();
+             gp->mean = field_argument(mean, "mean");
+             gp->sigma = field_argument(sigma, "sigma");
+             gp->kernel = kernel;
+             if (!bounds.is_none()) {
+               const auto corners = points_argument(bounds, "bounds");
+               if (corners.size() != 2) throw std::invalid_argument("bounds must be (min (3,), max (3,)).");
+               gp->bounds = Box3{corners[0], corners[1]};
+               for (int i = 0; i < 3; ++i)
+                 if (!(corners[0][i] < corners[1][i]))
+                   throw std::invalid_argument("bounds: min must be below max on every axis.");
+             }
+             if (gp->sigma->range().min < 0)
+               throw std::invalid_argument(
+                   "sigma must not be negative, it goes down to " + std::to_string(gp->sigma->range().min) +
+                   ": it is a standard deviation; say meaning=\"variance\" where a grid holds the variance.");
+             return gp;
+           }),
+           "mean"_a, "sigma"_a, "kernel"_a, py::kw_only(), "bounds"_a = py::none())
+      .def(
+          "mean",
+          [](const GaussianProcess& gp, const py::object& x) {
+            const auto p = points_argument(x, "x");
+            Array out(static_cast<py::ssize_t>(p.size()));
+            for (std::size_t i = 0; i < p.size(); ++i) out.mutable_at(i) = gp.mean->value(p[i]);
+            return out;
+          },
+          "x"_a, "Mean at points x (N, 3): (N,).")
+      .def(
+          "covariance",
+          [](const GaussianProcess& gp, const py::object& x, const py::object& y) {
+            return to_array(covariance_matrix(gp, points_argument(x, "x"), points_argument(y, "y")));
+          },
+          "x"_a, "y"_a, "Covariance of f between points x (N, 3) and y (M, 3): (N, M).")
+      .def("sample", &sample, "points"_a, "n"_a, "seed"_a = 0,
+           "n joint samples of f at points (N, 3), N up to 4096: (n, N).")
+      .def(
+          "plan",
+          [](const std::shared_ptr<GaussianProcess>& gp) {
+            py::dict out;
+            for (const auto& [key, text] :
+                 ProcessSurface(gp, {}, Memory::renewal_plus, Sampler::automatic, 1e-3).plan())
+              out[py::str(key)] = text;
+            return out;
+          },
+          "What a render of this process chooses and leaves out.");
+
+  m.def("first_hits", &first_hits_dict, "gp"_a, "origins"_a, "directions"_a, "t_max"_a, py::kw_only(),
+        "memory"_a = "renewal+", "start"_a = py::none(), "first_index"_a = 0, "sampler"_a = "auto",
+        "tolerance"_a = 1e-3, "seed"_a = 0, "threads"_a = 0,
+        "First change of sign from outside to inside along rays: dict of t (N,) (inf = none), position (N, 3), gradient (N, 3),\n"
+        "part (N,) (-1 = none), state (the `start` of rays that leave the hits) and counters.\n\n"
+        "origins, directions (N, 3), unit length. start: None (rays come from outside) or dict(value (N,), gradient (N, 3)):\n"
+        "rays leave a point where f = value (0 on the surface), remembered as `memory` says ('none', 'renewal', 'renewal+').\n"
+        "sampler: 'auto', 'convolution' or 'dense'. tolerance: probability of a missed root per ray. Row i uses the random\n"
+        "stream (seed, first_index + i), whatever the number of threads.");
+  m.def("line_values", &line_values_array, "gp"_a, "origins"_a, "directions"_a, "t"_a, py::kw_only(),
+        "memory"_a = "renewal+", "start"_a = py::none(), "first_index"_a = 0, "sampler"_a = "auto",
+        "tolerance"_a = 1e-3, "seed"_a = 0, "threads"_a = 0,
+        "Values of f at distances t (M,) on the sample paths that first_hits draws for the same arguments: (N, M); NaN where a\n"
+        "path was not sampled (behind its hit, or where the surface is certainly absent).");
+}
+
+}  // namespace gpis
