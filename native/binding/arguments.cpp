@@ -10,15 +10,17 @@ FieldPtr field_argument(const py::handle& value, const std::string& name) {
   if (PyFloat_Check(value.ptr()) || PyLong_Check(value.ptr()) || PyIndex_Check(value.ptr()) ||
       py::hasattr(value, "__float__"))
     return std::make_shared<ConstantField>(py::float_(py::reinterpret_borrow<py::object>(value)));
-  throw std::invalid_argument(name + " must be a field or a number, it is a " +
-                              py::str(py::type::handle_of(value).attr("__name__")).cast<std::string>() + ".");
+  throw std::invalid_argument(
+      name + " must be a field or a number, it is a " +
+      py::str(py::type::handle_of(value).attr("__name__")).cast<std::string>() + ".");
 }
 
 Memory memory_argument(const std::string& value, const std::string& name) {
   if (value == "none") return Memory::none;
   if (value == "renewal") return Memory::renewal;
   if (value == "renewal+") return Memory::renewal_plus;
-  throw std::invalid_argument(name + " is '" + value + "', it takes 'none', 'renewal' or 'renewal+'.");
+  throw std::invalid_argument(name + " is '" + value +
+                              "', it takes 'none', 'renewal' or 'renewal+'.");
 }
 
 py::dict counters_dict(const Counters& counters) {

@@ -52,7 +52,8 @@ SquaredExponential make_kernel(const py::object& length_scale, const py::object&
     const auto q = rotation.cast<std::vector<double>>();
     if (q.size() != 4) throw std::invalid_argument("rotation must be a quaternion (w, x, y, z).");
     const double n = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-    if (!(n > 0) || !std::isfinite(n)) throw std::invalid_argument("rotation must be a quaternion that is not zero.");
+    if (!(n > 0) || !std::isfinite(n))
+      throw std::invalid_argument("rotation must be a quaternion that is not zero.");
     const double w = q[0] / n, x = q[1] / n, y = q[2] / n, z = q[3] / n;
     axes = {{Vec3{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
              Vec3{2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
@@ -61,7 +62,8 @@ SquaredExponential make_kernel(const py::object& length_scale, const py::object&
   return SquaredExponential(l, axes);
 }
 
-Eigen::MatrixXd covariance_matrix(const GaussianProcess& gp, const std::vector<Vec3>& x, const std::vector<Vec3>& y) {
+Eigen::MatrixXd covariance_matrix(const GaussianProcess& gp, const std::vector<Vec3>& x,
+                                  const std::vector<Vec3>& y) {
   Eigen::MatrixXd k(x.size(), y.size());
   for (std::size_t i = 0; i < x.size(); ++i)
     for (std::size_t j = 0; j < y.size(); ++j)
@@ -79,11 +81,14 @@ Array to_array(const Eigen::MatrixXd& m) {
 Array sample(const GaussianProcess& gp, const py::object& at, py::ssize_t n, std::uint64_t seed) {
   const auto x = points_argument(at, "points");
   if (x.size() > 4096)
-    throw std::invalid_argument("sample draws at up to 4096 points jointly, these are " + std::to_string(x.size()) + ".");
+    throw std::invalid_argument("sample draws at up to 4096 points jointly, these are " +
+                                std::to_string(x.size()) + ".");
   if (n < 0) throw std::invalid_argument("n must not be negative.");
-  // Eigenvectors, not Cholesky: the matrix is singular to rounding wherever points are near (math.md §5, traps).
+  // Eigenvectors, not Cholesky: the matrix is singular to rounding wherever points are near
+  // (math.md §5, traps).
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance_matrix(gp, x, x));
-  const Eigen::MatrixXd factor = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+  const Eigen::MatrixXd factor =
+      eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
   Eigen::MatrixXd out(n, x.size());
   Eigen::VectorXd mean(x.size()), xi(x.size());
   for (std::size_t i = 0; i < x.size(); ++i) mean[i] = gp.mean->value(x[i]);
@@ -99,23 +104,28 @@ Sampler sampler_argument(const std::string& name) {
   if (name == "auto") return Sampler::automatic;
   if (name == "convolution") return Sampler::convolution;
   if (name == "dense") return Sampler::dense;
-  throw std::invalid_argument("sampler is '" + name + "', it takes 'auto', 'convolution' or 'dense'.");
+  throw std::invalid_argument("sampler is '" + name +
+                              "', it takes 'auto', 'convolution' or 'dense'.");
 }
 
 FirstHitsQuery query_argument(const py::object& origins, const py::object& directions, double t_max,
-                              const py::object& start, std::uint64_t first_index, std::uint64_t seed, int threads) {
+                              const py::object& start, std::uint64_t first_index,
+                              std::uint64_t seed, int threads) {
   FirstHitsQuery query;
   const auto o = points_argument(origins, "origins"), d = points_argument(directions, "directions");
   if (o.size() != d.size())
     throw std::invalid_argument("origins and directions must have as many rows, they have " +
-                                std::to_string(o.size()) + " and " + std::to_string(d.size()) + ".");
+                                std::to_string(o.size()) + " and " + std::to_string(d.size()) +
+                                ".");
   for (std::size_t i = 0; i < o.size(); ++i) {
     if (std::abs(length(d[i]) - 1) > 1e-6)
-      throw std::invalid_argument("directions[" + std::to_string(i) + "] must have length 1, it has " +
-                                  std::to_string(length(d[i])) + ".");
+      throw std::invalid_argument("directions[" + std::to_string(i) +
+                                  "] must have length 1, it has " + std::to_string(length(d[i])) +
+                                  ".");
     query.rays.push_back({o[i], d[i]});
   }
-  if (!(t_max > 0)) throw std::invalid_argument("t_max must be positive, it is " + std::to_string(t_max) + ".");
+  if (!(t_max > 0))
+    throw std::invalid_argument("t_max must be positive, it is " + std::to_string(t_max) + ".");
   if (threads < 0) throw std::invalid_argument("threads must not be negative (0 = all cores).");
   if (!start.is_none()) {
     const py::dict s = start.cast<py::dict>();
@@ -128,11 +138,13 @@ FirstHitsQuery query_argument(const py::object& origins, const py::object& direc
       throw std::invalid_argument("start must hold value (N,) and gradient (N, 3).");
     const Array value = Array::ensure(s["value"]);
     const auto gradient = points_argument(s["gradient"], "start['gradient']");
-    if (!value || value.ndim() != 1 || static_cast<std::size_t>(value.shape(0)) != o.size() || gradient.size() != o.size())
+    if (!value || value.ndim() != 1 || static_cast<std::size_t>(value.shape(0)) != o.size() ||
+        gradient.size() != o.size())
       throw std::invalid_argument("start must hold value (N,) and gradient (N, 3), one row a ray.");
     for (std::size_t i = 0; i < o.size(); ++i) {
       if (!(value.at(i) >= 0))
-        throw std::invalid_argument("start['value'][" + std::to_string(i) + "] must be 0 (on the surface) or positive (outside).");
+        throw std::invalid_argument("start['value'][" + std::to_string(i) +
+                                    "] must be 0 (on the surface) or positive (outside).");
       query.start.push_back({value.at(i), gradient[i]});
     }
   }
@@ -143,11 +155,15 @@ FirstHitsQuery query_argument(const py::object& origins, const py::object& direc
   return query;
 }
 
-py::dict first_hits_dict(const std::shared_ptr<GaussianProcess>& gp, const py::object& origins, const py::object& directions,
-                         double t_max, const std::string& memory, const py::object& start, std::uint64_t first_index,
-                         const std::string& sampler, double tolerance, std::uint64_t seed, int threads) {
-  const FirstHitsQuery query = query_argument(origins, directions, t_max, start, first_index, seed, threads);
-  const ProcessSurface surface(gp, {}, memory_argument(memory, "memory"), sampler_argument(sampler), tolerance);
+py::dict first_hits_dict(const std::shared_ptr<GaussianProcess>& gp, const py::object& origins,
+                         const py::object& directions, double t_max, const std::string& memory,
+                         const py::object& start, std::uint64_t first_index,
+                         const std::string& sampler, double tolerance, std::uint64_t seed,
+                         int threads) {
+  const FirstHitsQuery query =
+      query_argument(origins, directions, t_max, start, first_index, seed, threads);
+  const ProcessSurface surface(gp, {}, memory_argument(memory, "memory"), sampler_argument(sampler),
+                               tolerance);
   FirstHits hits;
   {
     py::gil_scoped_release release;
@@ -171,14 +187,17 @@ py::dict first_hits_dict(const std::shared_ptr<GaussianProcess>& gp, const py::o
                   "counters"_a = counters_dict(hits.counters));
 }
 
-Array line_values_array(const std::shared_ptr<GaussianProcess>& gp, const py::object& origins, const py::object& directions,
-                        const std::vector<double>& t, const std::string& memory, const py::object& start,
-                        std::uint64_t first_index, const std::string& sampler, double tolerance, std::uint64_t seed,
-                        int threads) {
+Array line_values_array(const std::shared_ptr<GaussianProcess>& gp, const py::object& origins,
+                        const py::object& directions, const std::vector<double>& t,
+                        const std::string& memory, const py::object& start,
+                        std::uint64_t first_index, const std::string& sampler, double tolerance,
+                        std::uint64_t seed, int threads) {
   if (t.empty()) throw std::invalid_argument("t must hold at least one distance.");
   const double t_max = *std::max_element(t.begin(), t.end());
-  const FirstHitsQuery query = query_argument(origins, directions, t_max, start, first_index, seed, threads);
-  const ProcessSurface surface(gp, {}, memory_argument(memory, "memory"), sampler_argument(sampler), tolerance);
+  const FirstHitsQuery query =
+      query_argument(origins, directions, t_max, start, first_index, seed, threads);
+  const ProcessSurface surface(gp, {}, memory_argument(memory, "memory"), sampler_argument(sampler),
+                               tolerance);
   std::vector<double> values;
   {
     py::gil_scoped_release release;
@@ -192,10 +211,11 @@ Array line_values_array(const std::shared_ptr<GaussianProcess>& gp, const py::ob
 }  // namespace
 
 void bind_process(py::module_& m) {
-  py::class_<SquaredExponential>(m, "SquaredExponential",
-                                 "Squared-exponential correlation exp(-q²/2), q² = rᵀA⁻¹r.\n\n"
-                                 "length_scale: number or (3,), in the unit of the process's space; rotation: quaternion\n"
-                                 "(w, x, y, z) that turns the axes of the length scales. Seyb et al. 2024.")
+  py::class_<SquaredExponential>(
+      m, "SquaredExponential",
+      "Squared-exponential correlation exp(-q²/2), q² = rᵀA⁻¹r.\n\n"
+      "length_scale: number or (3,), in the unit of the process's space; rotation: quaternion\n"
+      "(w, x, y, z) that turns the axes of the length scales. Seyb et al. 2024.")
       .def(py::init(&make_kernel), "length_scale"_a, py::kw_only(), "rotation"_a = py::none())
       .def_property_readonly("variance", [](const SquaredExponential&) { return 1.0; })
       .def(
@@ -204,7 +224,8 @@ void bind_process(py::module_& m) {
             const auto a = points_argument(x, "x"), b = points_argument(y, "y");
             Array out({a.size(), b.size()});
             for (std::size_t i = 0; i < a.size(); ++i)
-              for (std::size_t j = 0; j < b.size(); ++j) out.mutable_at(i, j) = k.covariance(a[i], b[j]);
+              for (std::size_t j = 0; j < b.size(); ++j)
+                out.mutable_at(i, j) = k.covariance(a[i], b[j]);
             return out;
           },
           "x"_a, "y"_a, "Correlation of g between points x (N, 3) and y (M, 3): (N, M).")
@@ -221,27 +242,31 @@ void bind_process(py::module_& m) {
   py::class_<GaussianProcess, std::shared_ptr<GaussianProcess>>(
       m, "GaussianProcess",
       "f = mean + sigma·g: outside where f > 0, the surface is f = 0.\n\n"
-      "mean, sigma: field or number; sigma is the standard deviation, in the unit of the mean, not negative.\n"
-      "kernel: correlation of g. bounds: (min (3,), max (3,)); outside there is no surface. A mean on a grid bounds the\n"
+      "mean, sigma: field or number; sigma is the standard deviation, in the unit of the mean, not "
+      "negative.\n"
+      "kernel: correlation of g. bounds: (min (3,), max (3,)); outside there is no surface. A mean "
+      "on a grid bounds the\n"
       "process to its nodes.")
-      .def(py::init([](const py::object& mean, const py::object& sigma, const SquaredExponential& kernel,
-                       const py::object& bounds) {
+      .def(py::init([](const py::object& mean, const py::object& sigma,
+                       const SquaredExponential& kernel, const py::object& bounds) {
              auto gp = std::make_shared<GaussianProcess>();
              gp->mean = field_argument(mean, "mean");
              gp->sigma = field_argument(sigma, "sigma");
              gp->kernel = kernel;
              if (!bounds.is_none()) {
                const auto corners = points_argument(bounds, "bounds");
-               if (corners.size() != 2) throw std::invalid_argument("bounds must be (min (3,), max (3,)).");
+               if (corners.size() != 2)
+                 throw std::invalid_argument("bounds must be (min (3,), max (3,)).");
                gp->bounds = Box3{corners[0], corners[1]};
                for (int i = 0; i < 3; ++i)
                  if (!(corners[0][i] < corners[1][i]))
                    throw std::invalid_argument("bounds: min must be below max on every axis.");
              }
              if (gp->sigma->range().min < 0)
-               throw std::invalid_argument(
-                   "sigma must not be negative, it goes down to " + std::to_string(gp->sigma->range().min) +
-                   ": it is a standard deviation; say meaning=\"variance\" where a grid holds the variance.");
+               throw std::invalid_argument("sigma must not be negative, it goes down to " +
+                                           std::to_string(gp->sigma->range().min) +
+                                           ": it is a standard deviation; say meaning=\"variance\" "
+                                           "where a grid holds the variance.");
              return gp;
            }),
            "mean"_a, "sigma"_a, "kernel"_a, py::kw_only(), "bounds"_a = py::none())
@@ -257,7 +282,8 @@ void bind_process(py::module_& m) {
       .def(
           "covariance",
           [](const GaussianProcess& gp, const py::object& x, const py::object& y) {
-            return to_array(covariance_matrix(gp, points_argument(x, "x"), points_argument(y, "y")));
+            return to_array(
+                covariance_matrix(gp, points_argument(x, "x"), points_argument(y, "y")));
           },
           "x"_a, "y"_a, "Covariance of f between points x (N, 3) and y (M, 3): (N, M).")
       .def("sample", &sample, "points"_a, "n"_a, "seed"_a = 0,
@@ -273,19 +299,24 @@ void bind_process(py::module_& m) {
           },
           "What a render of this process chooses and leaves out.");
 
-  m.def("first_hits", &first_hits_dict, "gp"_a, "origins"_a, "directions"_a, "t_max"_a, py::kw_only(),
-        "memory"_a = "renewal+", "start"_a = py::none(), "first_index"_a = 0, "sampler"_a = "auto",
-        "tolerance"_a = 1e-3, "seed"_a = 0, "threads"_a = 0,
-        "First change of sign from outside to inside along rays: dict of t (N,) (inf = none), position (N, 3), gradient (N, 3),\n"
+  m.def("first_hits", &first_hits_dict, "gp"_a, "origins"_a, "directions"_a, "t_max"_a,
+        py::kw_only(), "memory"_a = "renewal+", "start"_a = py::none(), "first_index"_a = 0,
+        "sampler"_a = "auto", "tolerance"_a = 1e-3, "seed"_a = 0, "threads"_a = 0,
+        "First change of sign from outside to inside along rays: dict of t (N,) (inf = none), "
+        "position (N, 3), gradient (N, 3),\n"
         "part (N,) (-1 = none), state (the `start` of rays that leave the hits) and counters.\n\n"
-        "origins, directions (N, 3), unit length. start: None (rays come from outside) or dict(value (N,), gradient (N, 3)):\n"
-        "rays leave a point where f = value (0 on the surface), remembered as `memory` says ('none', 'renewal', 'renewal+').\n"
-        "sampler: 'auto', 'convolution' or 'dense'. tolerance: probability of a missed root per ray. Row i uses the random\n"
+        "origins, directions (N, 3), unit length. start: None (rays come from outside) or "
+        "dict(value (N,), gradient (N, 3)):\n"
+        "rays leave a point where f = value (0 on the surface), remembered as `memory` says "
+        "('none', 'renewal', 'renewal+').\n"
+        "sampler: 'auto', 'convolution' or 'dense'. tolerance: probability of a missed root per "
+        "ray. Row i uses the random\n"
         "stream (seed, first_index + i), whatever the number of threads.");
-  m.def("line_values", &line_values_array, "gp"_a, "origins"_a, "directions"_a, "t"_a, py::kw_only(),
-        "memory"_a = "renewal+", "start"_a = py::none(), "first_index"_a = 0, "sampler"_a = "auto",
-        "tolerance"_a = 1e-3, "seed"_a = 0, "threads"_a = 0,
-        "Values of f at distances t (M,) on the sample paths that first_hits draws for the same arguments: (N, M); NaN where a\n"
+  m.def("line_values", &line_values_array, "gp"_a, "origins"_a, "directions"_a, "t"_a,
+        py::kw_only(), "memory"_a = "renewal+", "start"_a = py::none(), "first_index"_a = 0,
+        "sampler"_a = "auto", "tolerance"_a = 1e-3, "seed"_a = 0, "threads"_a = 0,
+        "Values of f at distances t (M,) on the sample paths that first_hits draws for the same "
+        "arguments: (N, M); NaN where a\n"
         "path was not sampled (behind its hit, or where the surface is certainly absent).");
 }
 

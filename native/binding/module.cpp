@@ -1,5 +1,6 @@
 #include <pybind11/pybind11.h>
 
+#include "binding/bindings.h"
 #include "binding/build_info.h"
 
 PYBIND11_MODULE(gpis_native, m) {
@@ -7,4 +8,5 @@ PYBIND11_MODULE(gpis_native, m) {
       "Stochastic implicit surfaces: Gaussian processes, their first hits along rays, and light "
       "transport on them.";
   gpis::bind_build_info(m);
+  gpis::bind_process(m);
 }

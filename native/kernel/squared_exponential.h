@@ -1,4 +1,5 @@
-// Squared-exponential correlation κ(q) = exp(-q²/2), q² = rᵀA⁻¹r, A symmetric positive definite (squared length scales).
+// Squared-exponential correlation κ(q) = exp(-q²/2), q² = rᵀA⁻¹r, A symmetric positive definite
+// (squared length scales).
 #pragma once
 
 #include <cmath>
@@ -9,7 +10,8 @@ namespace gpis {
 
 class SquaredExponential {
  public:
-  // Length scales along the axes of the rotation (columns of `axes`); all must be positive and finite.
+  // Length scales along the axes of the rotation (columns of `axes`); all must be positive and
+  // finite.
   explicit SquaredExponential(const Vec3& length_scale = {1, 1, 1}, const Mat3& axes = {});
 
   static double correlation(double q) { return std::exp(-0.5 * q * q); }
@@ -23,7 +25,9 @@ class SquaredExponential {
   const Mat3& inverse_a() const { return inverse_a_; }  // A⁻¹
   // B with A⁻¹ = Bᵀ B: whitens a vector, |B d| = 1/ℓ_d.
   const Mat3& whitening() const { return whitening_; }
-  double min_length_scale() const { return std::min({length_scale_.x, length_scale_.y, length_scale_.z}); }
+  double min_length_scale() const {
+    return std::min({length_scale_.x, length_scale_.y, length_scale_.z});
+  }
 
  private:
   Vec3 length_scale_;

@@ -1,6 +1,7 @@
 // Sampler 1, line convolution (math.md §5.1): in units of the length scale along the ray,
 //   g(q) = Σ_j φ(q - jh) ξ_j,  φ(u) = (2/π)^¼ √h exp(-u²),  ξ_j iid N(0,1),
-// exactly Gaussian, random access, no linear solve. h = ½ and nodes within ±4 give the correlation exp(-q²/2) to 9e-8.
+// exactly Gaussian, random access, no linear solve. h = ½ and nodes within ±4 give the correlation
+// exp(-q²/2) to 9e-8.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,15 +15,16 @@ namespace gpis {
 
 class ConvolutionPath {
  public:
-  static constexpr double kStep = 0.5;   // h, also the march's natural step
-  static constexpr int kNodes = 16;      // nodes in reach of one cell [kh, (k+1)h): k-7 … k+8
+  static constexpr double kStep = 0.5;  // h, also the march's natural step
+  static constexpr int kNodes = 16;     // nodes in reach of one cell [kh, (k+1)h): k-7 … k+8
 
   void reset(double /*reach*/) {
     nodes_.clear();
     runs_.clear();
   }
 
-  // Draw what the cell [kh, (k+1)h) needs. Cells come in increasing order; a gap wider than the kernel starts a new run.
+  // Draw what the cell [kh, (k+1)h) needs. Cells come in increasing order; a gap wider than the
+  // kernel starts a new run.
   void prepare(long cell, Rng& rng, Counters& counters) {
     const long first = cell - 7, last = cell + 8;
     if (runs_.empty() || first > end(runs_.back())) runs_.push_back({first, nodes_.size()});
@@ -32,8 +34,8 @@ class ConvolutionPath {
     }
   }
 
-  // g and dg/dq at the ends of a cell, q = kh and (k+1)h: fixed weights. The node at distance 4 is left out on both sides,
-  // so that neighbouring cells agree to the last bit.
+  // g and dg/dq at the ends of a cell, q = kh and (k+1)h: fixed weights. The node at distance 4 is
+  // left out on both sides, so that neighbouring cells agree to the last bit.
   void at_left(long cell, double& g, double& dg) const { ends(cell, kTable.left, g, dg); }
   void at_right(long cell, double& g, double& dg) const { ends(cell, kTable.right, g, dg); }
 
@@ -47,7 +49,8 @@ class ConvolutionPath {
     for (int i = 8; i < kNodes; ++i) power[i] = power[i - 1] * up;
     for (int i = 6; i >= 0; --i) power[i] = power[i + 1] * down;
     const Eigen::Array<double, kNodes, 1> w =
-        Eigen::Map<const Eigen::Array<double, kNodes, 1>>(power) * kTable.gauss * window(cell).array();
+        Eigen::Map<const Eigen::Array<double, kNodes, 1>>(power) * kTable.gauss *
+        window(cell).array();
     const double sum = w.sum();
     const double moment = (w * kTable.node).sum();
     g = sum;
@@ -86,7 +89,9 @@ class ConvolutionPath {
   inline static const Table kTable;
 
   // One past the last node drawn, as the run that is still growing knows it.
-  long end(const Run& run) const { return run.first + static_cast<long>(nodes_.size() - run.offset); }
+  long end(const Run& run) const {
+    return run.first + static_cast<long>(nodes_.size() - run.offset);
+  }
 
   void ends(long cell, const End& weights, double& g, double& dg) const {
     const Window xi = window(cell);

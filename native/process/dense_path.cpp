@@ -22,7 +22,9 @@ Eigen::Matrix2d block(double q) {
 
 }  // namespace
 
-int DensePath::factorisations() { return g_factorisations; }
+int DensePath::factorisations() {
+  return g_factorisations;
+}
 
 const DensePath::Factor& DensePath::factor(double reach) {
   static Factor factors[3];
@@ -41,8 +43,7 @@ const DensePath::Factor& DensePath::factor(double reach) {
     const double floor = 1e-14 * values[values.size() - 1];
     int rank = 0;
     while (rank < values.size() && values[values.size() - 1 - rank] > floor) ++rank;
-    factors[i] = eigen.eigenvectors().rightCols(rank) *
-                 values.tail(rank).cwiseSqrt().asDiagonal();
+    factors[i] = eigen.eigenvectors().rightCols(rank) * values.tail(rank).cwiseSqrt().asDiagonal();
     ++g_factorisations;
   });
   return factors[i];
@@ -51,8 +52,10 @@ const DensePath::Factor& DensePath::factor(double reach) {
 void DensePath::reset(double reach) {
   if (reach > kMaxReach)
     throw std::invalid_argument(
-        "The dense sampler serves lines of up to 64 length scales inside the uncertain region, this one has " +
-        std::to_string(reach) + ": take the convolution sampler, a longer length_scale or smaller bounds.");
+        "The dense sampler serves lines of up to 64 length scales inside the uncertain region, "
+        "this one has " +
+        std::to_string(reach) +
+        ": take the convolution sampler, a longer length_scale or smaller bounds.");
   factor_ = &factor(reach);
   drawn_ = false;
 }

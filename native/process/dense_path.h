@@ -1,7 +1,8 @@
-// Sampler 5, dense: values and slopes of g at all points of a line drawn JOINTLY from their covariance, the reference for the
-// other samplers. The points stand at a fixed spacing in units of the length scale, so the covariance of a stationary
-// kernel is factorised once per process, not per ray. Between two points the path is the cubic through both values and
-// slopes (standard deviation of what that leaves out: 1.0e-4).
+// Sampler 5, dense: values and slopes of g at all points of a line drawn JOINTLY from their
+// covariance, the reference for the other samplers. The points stand at a fixed spacing in units of
+// the length scale, so the covariance of a stationary kernel is factorised once per process, not
+// per ray. Between two points the path is the cubic through both values and slopes (standard
+// deviation of what that leaves out: 1.0e-4).
 #pragma once
 
 #include <Eigen/Core>
@@ -27,8 +28,8 @@ class DensePath {
   static int factorisations();
 
  private:
-  // K = F Fᵀ for the interleaved vector (g_0, g'_0, g_1, g'_1, …), columns the significant eigenvectors: eigenvalues below
-  // 1e-14 of the largest are rounding noise of the matrix itself.
+  // K = F Fᵀ for the interleaved vector (g_0, g'_0, g_1, g'_1, …), columns the significant
+  // eigenvectors: eigenvalues below 1e-14 of the largest are rounding noise of the matrix itself.
   using Factor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   static const Factor& factor(double reach);
 

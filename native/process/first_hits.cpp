@@ -18,15 +18,17 @@ Counters for_each_hit(const ProcessSurface& surface, const FirstHitsQuery& query
   tbb::enumerable_thread_specific<Worker> workers;
   tbb::task_arena arena(query.threads > 0 ? query.threads : tbb::task_arena::automatic);
   arena.execute([&] {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, query.rays.size(), 256), [&](const auto& range) {
-      Worker& worker = workers.local();
-      for (std::size_t i = range.begin(); i != range.end(); ++i) {
-        Rng rng(query.seed, query.first_index + i);
-        const Start start = query.start.empty() ? Start{} : surface.start_from(&query.start[i]);
-        const double t = surface.first_hit(worker.line, query.rays[i], query.t_max, start, rng, worker.counters);
-        visit(i, worker.line, t, rng, worker.counters);
-      }
-    });
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, query.rays.size(), 256), [&](const auto& range) {
+          Worker& worker = workers.local();
+          for (std::size_t i = range.begin(); i != range.end(); ++i) {
+            Rng rng(query.seed, query.first_index + i);
+            const Start start = query.start.empty() ? Start{} : surface.start_from(&query.start[i]);
+            const double t = surface.first_hit(worker.line, query.rays[i], query.t_max, start, rng,
+                                               worker.counters);
+            visit(i, worker.line, t, rng, worker.counters);
+          }
+        });
   });
   Counters total;
   for (const Worker& worker : workers) total.add(worker.counters);
@@ -55,7 +57,8 @@ FirstHits first_hits(const ProcessSurface& surface, const FirstHitsQuery& query)
 
 std::vector<double> line_values(const ProcessSurface& surface, const FirstHitsQuery& query,
                                 const std::vector<double>& t) {
-  std::vector<double> values(query.rays.size() * t.size(), std::numeric_limits<double>::quiet_NaN());
+  std::vector<double> values(query.rays.size() * t.size(),
+                             std::numeric_limits<double>::quiet_NaN());
   for_each_hit(surface, query, [&](std::size_t i, const Line& line, double, Rng&, Counters&) {
     for (std::size_t j = 0; j < t.size(); ++j)
       if (surface.sampled_at(line, t[j])) values[i * t.size() + j] = surface.value(line, t[j]);

@@ -1,4 +1,5 @@
-// First hits of many rays with one process: the process alone, without light (scripts, tests, benchmarks).
+// First hits of many rays with one process: the process alone, without light (scripts, tests,
+// benchmarks).
 #pragma once
 
 #include <vector>
@@ -11,21 +12,22 @@ namespace gpis {
 struct FirstHitsQuery {
   std::vector<Ray> rays;
   double t_max = kInfinity;
-  std::vector<State> start;  // one a ray: rays that leave a surface point; empty: rays that come from outside
+  std::vector<State>
+      start;  // one a ray: rays that leave a surface point; empty: rays that come from outside
   std::uint64_t seed = 0, first_index = 0;  // row i uses the random stream (seed, first_index + i)
   int threads = 0;                          // 0 = all cores
 };
 
 struct FirstHits {
-  std::vector<double> t;        // infinity where there is none
-  std::vector<State> state;     // value 0 and a gradient drawn from its law; NaN where there is no hit
+  std::vector<double> t;     // infinity where there is none
+  std::vector<State> state;  // value 0 and a gradient drawn from its law; NaN where there is no hit
   Counters counters;
 };
 
 FirstHits first_hits(const ProcessSurface& surface, const FirstHitsQuery& query);
 
-// Values of f at `t` along every ray, row after row, on the sample paths that first_hits draws; NaN where the path was not
-// sampled (behind the hit, or where the surface is certainly absent).
+// Values of f at `t` along every ray, row after row, on the sample paths that first_hits draws; NaN
+// where the path was not sampled (behind the hit, or where the surface is certainly absent).
 std::vector<double> line_values(const ProcessSurface& surface, const FirstHitsQuery& query,
                                 const std::vector<double>& t);
 

@@ -1,4 +1,5 @@
-// The model: f = mean + sigma·g, g a zero-mean unit-variance Gaussian process; f > 0 outside, the surface is f = 0 (math.md §1-2).
+// The model: f = mean + sigma·g, g a zero-mean unit-variance Gaussian process; f > 0 outside, the
+// surface is f = 0 (math.md §1-2).
 #pragma once
 
 #include <memory>

@@ -21,7 +21,8 @@ class ZeroPath {
 };
 
 struct Line::Impl {
-  // Object space. q = (t - anchor) · inverse_length is the distance from the first uncertain point in length scales.
+  // Object space. q = (t - anchor) · inverse_length is the distance from the first uncertain point
+  // in length scales.
   Vec3 origin, direction;
   double inverse_length = 1, anchor = 0;
   Vec3 e1, e2, ed;  // orthonormal in whitened space, ed along the ray
@@ -29,7 +30,8 @@ struct Line::Impl {
   // Conditions at the anchor by Matheron's rule (math.md §5.1): g(q) += κ(q)(Δ₀ + qΔ₁).
   double delta_value = 0, delta_slope = 0;
   bool conditioned = false;
-  // Remembered transverse slopes γ(0) (math.md §4); without them the prior's, of correlation 0 with anything.
+  // Remembered transverse slopes γ(0) (math.md §4); without them the prior's, of correlation 0 with
+  // anything.
   double gamma1 = 0, gamma2 = 0;
   bool has_gamma = false;
 

@@ -1,6 +1,7 @@
-// First hit along a line (math.md §6): march in steps over which the sample path is a cubic up to a known deviation, divide a step
-// while a root could hide in it, refine the root on the same sample path. Templated on the lines of mean and deviation and
-// on the path, so that nothing virtual is called per step in the common cases.
+// First hit along a line (math.md §6): march in steps over which the sample path is a cubic up to a
+// known deviation, divide a step while a root could hide in it, refine the root on the same sample
+// path. Templated on the lines of mean and deviation and on the path, so that nothing virtual is
+// called per step in the common cases.
 #pragma once
 
 #include <algorithm>
@@ -15,12 +16,19 @@ namespace gpis {
 template <class MeanLine, class SigmaLine, class Path>
 class March {
  public:
-  March(Line::Impl& line, Path& path, MeanLine mean, SigmaLine sigma, const PlannedLine& plan, Rng& rng,
-        Counters& counters)
-      : line_(line), path_(path), mean_(std::move(mean)), sigma_(std::move(sigma)), plan_(plan), rng_(rng), counters_(counters) {
+  March(Line::Impl& line, Path& path, MeanLine mean, SigmaLine sigma, const PlannedLine& plan,
+        Rng& rng, Counters& counters)
+      : line_(line),
+        path_(path),
+        mean_(std::move(mean)),
+        sigma_(std::move(sigma)),
+        plan_(plan),
+        rng_(rng),
+        counters_(counters) {
     const double speed = length(line.direction);
     smooth_step_ = 0.25 * plan.smooth_scale / speed;
-    // |∂⁴ mean| <= 12 / scale³ along a unit-speed line (a sphere's distance); a cubic through both ends is off by h⁴/384 of it.
+    // |∂⁴ mean| <= 12 / scale³ along a unit-speed line (a sphere's distance); a cubic through both
+    // ends is off by h⁴/384 of it.
     mean_deviation_ = std::isinf(plan.smooth_scale)
                           ? 0
                           : 0.05 * std::pow(speed, 4) / std::pow(plan.smooth_scale, 3);
@@ -93,7 +101,9 @@ class March {
     double mean, sigma, dsigma;  // of the fields
   };
 
-  double cell_end() const { return line_.anchor + (cell_ + 1) * Path::kStep / line_.inverse_length; }
+  double cell_end() const {
+    return line_.anchor + (cell_ + 1) * Path::kStep / line_.inverse_length;
+  }
 
   double step_end(double a, double t_end) {
     piece_end_ = kInfinity;
@@ -107,10 +117,11 @@ class March {
     if constexpr (SigmaLine::kBreaks) sigma_.enter(a, b);
   }
 
-  // Right after the start the remembered value and slope may hold f lower than the prior's threshold says (B13).
+  // Right after the start the remembered value and slope may hold f lower than the prior's
+  // threshold says (B13).
   double threshold_at(double t) const {
     return line_.conditioned && line_.q_of(t) < 6 ? plan_.skip_threshold + extra_threshold_
-                                                   : plan_.skip_threshold;
+                                                  : plan_.skip_threshold;
   }
 
   // f = μ + σ g, f' = μ' + gσ' + σ g' (math.md §2).
@@ -154,7 +165,8 @@ class March {
     double want_g = g, want_dg = dg;
     const double dmean = prior.df - prior.dsigma * g - s * dg * line_.inverse_length;
     if (start.kind == Start::Kind::outside) {
-      // f > 0. A draw that is outside already follows the truncated law; another one is replaced by it.
+      // f > 0. A draw that is outside already follows the truncated law; another one is replaced by
+      // it.
       if (prior.f > 0) return prior;
       want_g = truncated_normal(-prior.mean / s, rng_);
       ++counters_.truncated_normals;
@@ -185,7 +197,8 @@ class March {
     return start.state.value == 0 ? leaving(p) : p;
   }
 
-  // A ray that leaves the surface has a positive slope; only rounding at grazing directions can say otherwise.
+  // A ray that leaves the surface has a positive slope; only rounding at grazing directions can say
+  // otherwise.
   Point leaving(Point p) {
     const double floor = 1e-14 * (std::abs(p.mean) + p.sigma) * line_.inverse_length;
     if (!(p.df > floor)) {
@@ -197,16 +210,21 @@ class March {
 
   enum class Verdict { none, single, unclear };
 
-  // Bernstein coefficients of the cubic through both ends, less the deviation of the true path from it:
-  // u²(h-u)² |g''''| / 24 <= (4/3)(B₁+B₂) · 4.5 √105 (h/2)⁴/24, 4.5 standard deviations of g'''' (√105 per length scale⁴).
+  // Bernstein coefficients of the cubic through both ends, less the deviation of the true path from
+  // it: u²(h-u)² |g''''| / 24 <= (4/3)(B₁+B₂) · 4.5 √105 (h/2)⁴/24, 4.5 standard deviations of
+  // g'''' (√105 per length scale⁴).
   Verdict classify(const Point& a, const Point& b) const {
-    if (a.f < 0) return Verdict::none;  // inside (after a skip, or a certain start): wait until the path is out
+    if (a.f < 0)
+      return Verdict::none;  // inside (after a skip, or a certain start): wait until the path is
+                             // out
     const double h = b.t - a.t, hq = h * line_.inverse_length;
     const double sigma = std::max(a.sigma, b.sigma) + std::abs(b.dsigma - a.dsigma) * h;
-    const double margin = 0.16 * sigma * (hq * hq) * (hq * hq) + mean_deviation_ * (h * h) * (h * h);
+    const double margin =
+        0.16 * sigma * (hq * hq) * (hq * hq) + mean_deviation_ * (h * h) * (h * h);
     const double c1 = a.f + h * a.df / 3, c2 = b.f - h * b.df / 3;
     if (b.f > 0) return c1 > margin && c2 > margin ? Verdict::none : Verdict::unclear;
-    return c1 < margin && c2 > -margin ? Verdict::unclear : Verdict::single;  // Descartes' rule of signs
+    return c1 < margin && c2 > -margin ? Verdict::unclear
+                                       : Verdict::single;  // Descartes' rule of signs
   }
 
   bool find_root(const Point& from, const Point& to) {
@@ -238,7 +256,8 @@ class March {
     return false;
   }
 
-  // Newton inside a bracket f(lo) > 0 >= f(hi), first guess from the cubic; evaluates the path itself, so the root is the path's.
+  // Newton inside a bracket f(lo) > 0 >= f(hi), first guess from the cubic; evaluates the path
+  // itself, so the root is the path's.
   void refine(const Point& lo, const Point& hi) {
     double a = lo.t, b = hi.t;
     const double tolerance = 1e-11 / line_.inverse_length + 4e-16 * std::abs(b);

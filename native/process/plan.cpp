@@ -9,13 +9,14 @@
 namespace gpis {
 namespace {
 
-// A field's line held by value under its concrete type, so that the march calls it directly. `breaks`: whether its derivative
-// may jump somewhere.
+// A field's line held by value under its concrete type, so that the march calls it directly.
+// `breaks`: whether its derivative may jump somewhere.
 template <class F, bool breaks>
 class DirectLine {
  public:
   static constexpr bool kBreaks = breaks;
-  DirectLine(const Field& field, const Vec3& o, const Vec3& d) : line_(static_cast<const F&>(field), o, d) {}
+  DirectLine(const Field& field, const Vec3& o, const Vec3& d)
+      : line_(static_cast<const F&>(field), o, d) {}
   double next_break(double t) const { return line_.next_break(t); }
   void enter(double a, double b) { line_.enter(a, b); }
   void evaluate(double t, double& v, double& dv) const { line_.evaluate(t, v, dv); }
@@ -45,18 +46,24 @@ class AnyLine {
   std::unique_ptr<FieldLine> line_;
 };
 
-ConvolutionPath& path_of(Line::Impl& line, ConvolutionPath*) { return line.convolution; }
-DensePath& path_of(Line::Impl& line, DensePath*) { return line.dense; }
-ZeroPath& path_of(Line::Impl& line, ZeroPath*) { return line.zero; }
+ConvolutionPath& path_of(Line::Impl& line, ConvolutionPath*) {
+  return line.convolution;
+}
+DensePath& path_of(Line::Impl& line, DensePath*) {
+  return line.dense;
+}
+ZeroPath& path_of(Line::Impl& line, ZeroPath*) {
+  return line.zero;
+}
 
 template <class MeanLine, class SigmaLine, class Path>
-double march(const PlannedLine& plan, Line::Impl& line, double t_begin, double t_end, const Start& start, Rng& rng,
-             Counters& counters) {
+double march(const PlannedLine& plan, Line::Impl& line, double t_begin, double t_end,
+             const Start& start, Rng& rng, Counters& counters) {
   const GaussianProcess& process = *plan.process;
-  return March<MeanLine, SigmaLine, Path>(
-             line, path_of(line, static_cast<Path*>(nullptr)),
-             MeanLine(*process.mean, line.origin, line.direction),
-             SigmaLine(*process.sigma, line.origin, line.direction), plan, rng, counters)
+  return March<MeanLine, SigmaLine, Path>(line, path_of(line, static_cast<Path*>(nullptr)),
+                                          MeanLine(*process.mean, line.origin, line.direction),
+                                          SigmaLine(*process.sigma, line.origin, line.direction),
+                                          plan, rng, counters)
       .run(t_begin, t_end, start);
 }
 
@@ -93,25 +100,33 @@ Box3 intersection(const Box3& a, const Box3& b) {
 
 }  // namespace
 
-PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Sampler sampler, double missed_root) {
+PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Sampler sampler,
+                      double missed_root) {
   PlannedLine plan;
   const Range sigma = process->sigma->range();
   if (sigma.min < 0)
-    refuse("sigma must not be negative, it goes down to ", sigma.min,
-           ": it is a standard deviation; say meaning=\"variance\" if the grid holds the variance.");
+    refuse(
+        "sigma must not be negative, it goes down to ", sigma.min,
+        ": it is a standard deviation; say meaning=\"variance\" if the grid holds the variance.");
   if (!std::isfinite(sigma.max)) refuse("sigma must be bounded: use .clamped(low, high) on it.");
   if (!(missed_root > 0 && missed_root < 1))
     refuse("missed_root must lie between 0 and 1, it is ", missed_root, ".");
 
-  // Where a grid ends its field is a constant, and a jump there would be a surface of its own: no surface outside.
+  // Where a grid ends its field is a constant, and a jump there would be a surface of its own: no
+  // surface outside.
   plan.bounds = process->bounds.value_or(everywhere());
-  if (const auto support = process->mean->support()) plan.bounds = intersection(plan.bounds, *support);
-  if (plan.bounds.empty()) refuse("The bounds and the grid of the mean do not meet: there is no surface.");
+  if (const auto support = process->mean->support())
+    plan.bounds = intersection(plan.bounds, *support);
+  if (plan.bounds.empty())
+    refuse("The bounds and the grid of the mean do not meet: there is no surface.");
 
-  // Rice: a crossing where μ > zσ on a length L has probability below L√λ₂/(2πℓ) e^{-z²/2} <= ε/2 (definitions B13).
+  // Rice: a crossing where μ > zσ on a length L has probability below L√λ₂/(2πℓ) e^{-z²/2} <= ε/2
+  // (definitions B13).
   const double diagonal = length(plan.bounds.max - plan.bounds.min);
-  const double lengths = std::isfinite(diagonal) ? diagonal / process->kernel.min_length_scale() : 1e4;
-  plan.skip_deviations = std::sqrt(std::max(16.0, 2 * std::log(std::max(1.0, lengths) / (kPi * missed_root))));
+  const double lengths =
+      std::isfinite(diagonal) ? diagonal / process->kernel.min_length_scale() : 1e4;
+  plan.skip_deviations =
+      std::sqrt(std::max(16.0, 2 * std::log(std::max(1.0, lengths) / (kPi * missed_root))));
   plan.sigma_max = sigma.max;
   // A certain surface (σ = 0) still needs a last step across it: stop a little before the root.
   plan.skip_threshold =
@@ -134,9 +149,10 @@ PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Sampler sa
     plan.march = choose_march<DensePath>(*process);
   } else {
     plan.sampler = Sampler::convolution;
-    plan.sampler_reason = sampler == Sampler::convolution
-                              ? "convolution: asked for"
-                              : "convolution: stationary squared exponential, correlation exact to 9e-8";
+    plan.sampler_reason =
+        sampler == Sampler::convolution
+            ? "convolution: asked for"
+            : "convolution: stationary squared exponential, correlation exact to 9e-8";
     plan.march = choose_march<ConvolutionPath>(*process);
   }
   plan.process = std::move(process);

@@ -1,4 +1,5 @@
-// What is decided about a process once, before rendering: the sampler, the specialised march, and what can be skipped.
+// What is decided about a process once, before rendering: the sampler, the specialised march, and
+// what can be skipped.
 #pragma once
 
 #include <memory>
@@ -10,22 +11,24 @@ namespace gpis {
 
 struct PlannedLine {
   std::shared_ptr<const GaussianProcess> process;
-  double sigma_max = 0;        // over all space
-  double skip_threshold = 0;   // where the mean exceeds it, the surface is certainly absent (definitions B13)
+  double sigma_max = 0;  // over all space
+  double skip_threshold =
+      0;  // where the mean exceeds it, the surface is certainly absent (definitions B13)
   double skip_deviations = 0;  // the same in standard deviations
   double smooth_scale = kInfinity;
-  Box3 bounds;                 // object space; outside there is no surface
-  Mat3 unwhitening;            // B⁻ᵀ
+  Box3 bounds;                             // object space; outside there is no surface
+  Mat3 unwhitening;                        // B⁻ᵀ
   Sampler sampler = Sampler::convolution;  // resolved, never automatic
   std::string sampler_reason;
 
   // March of the chosen combination of mean, deviation and sampler.
-  using March = double (*)(const PlannedLine&, Line::Impl&, double t_begin, double t_end, const Start&, Rng&,
-                           Counters&);
+  using March = double (*)(const PlannedLine&, Line::Impl&, double t_begin, double t_end,
+                           const Start&, Rng&, Counters&);
   March march = nullptr;
 };
 
 // Throws std::invalid_argument with a sentence where the process cannot be rendered.
-PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Sampler sampler, double missed_root);
+PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Sampler sampler,
+                      double missed_root);
 
 }  // namespace gpis

@@ -1,4 +1,5 @@
-// Random starts of a line: the truncated normal and the flux-weighted normal (formulas C5, C6). Both are exact for every a.
+// Random starts of a line: the truncated normal and the flux-weighted normal (formulas C5, C6).
+// Both are exact for every a.
 #include <cmath>
 
 #include "process/surface.h"
@@ -20,7 +21,8 @@ double truncated_normal(double a, Rng& rng) {
 
 double flux_weighted_normal(double a, Rng& rng) {
   if (a <= 0) {
-    // Gamma(2)/λ proposal, λ the mode's reciprocal scale; acceptance >= .73. For a -> -inf (-a + √(a²+8))/2 -> -a: no cancellation.
+    // Gamma(2)/λ proposal, λ the mode's reciprocal scale; acceptance >= .73. For a -> -inf (-a +
+    // √(a²+8))/2 -> -a: no cancellation.
     const double lambda = (-a + std::sqrt(a * a + 8)) / 2;
     for (;;) {
       const double z = -std::log(rng.positive_uniform() * rng.positive_uniform()) / lambda;
@@ -28,7 +30,8 @@ double flux_weighted_normal(double a, Rng& rng) {
       if (rng.uniform() < std::exp(-r * r / 2)) return z;
     }
   }
-  // z = a + y with density (a + y)₊ φ(y) <= (a + |y|) φ(y): a mixture of a normal and a signed Rayleigh.
+  // z = a + y with density (a + y)₊ φ(y) <= (a + |y|) φ(y): a mixture of a normal and a signed
+  // Rayleigh.
   const double p = a / (a + std::sqrt(2 / kPi));
   for (;;) {
     double y;

@@ -13,8 +13,9 @@ Line::~Line() = default;
 Line::Line(Line&&) noexcept = default;
 Line& Line::operator=(Line&&) noexcept = default;
 
-ProcessSurface::ProcessSurface(std::shared_ptr<const GaussianProcess> process, const Affine& object_to_world,
-                               Memory memory, Sampler sampler, double missed_root)
+ProcessSurface::ProcessSurface(std::shared_ptr<const GaussianProcess> process,
+                               const Affine& object_to_world, Memory memory, Sampler sampler,
+                               double missed_root)
     : process_(process),
       object_to_world_(object_to_world),
       memory_(memory),
@@ -22,7 +23,8 @@ ProcessSurface::ProcessSurface(std::shared_ptr<const GaussianProcess> process, c
   const double volume = determinant(object_to_world.linear);
   if (!std::isfinite(volume) || std::abs(volume) < 1e-300)
     throw std::invalid_argument(
-        "The transform has no volume (a scale of zero?): it cannot be inverted. Give every axis a scale.");
+        "The transform has no volume (a scale of zero?): it cannot be inverted. Give every axis a "
+        "scale.");
   world_to_object_ = inverse(object_to_world);
   const Box3& box = planned_->bounds;
   if (std::isfinite(length(box.max - box.min))) {
@@ -35,8 +37,8 @@ ProcessSurface::ProcessSurface(std::shared_ptr<const GaussianProcess> process, c
   }
 }
 
-double ProcessSurface::first_hit(Line& line, const Ray& ray, double t_max, const Start& start, Rng& rng,
-                                 Counters& counters) const {
+double ProcessSurface::first_hit(Line& line, const Ray& ray, double t_max, const Start& start,
+                                 Rng& rng, Counters& counters) const {
   Line::Impl& l = line.impl();
   l.stretches.clear();
   l.hit_t = kInfinity;
@@ -59,7 +61,8 @@ double ProcessSurface::first_hit(Line& line, const Ray& ray, double t_max, const
   l.ed = frame.n;
   if (start.kind == Start::Kind::value_slope) {
     // γ(0) = wᵢᵀ∇g with ∇g = (∇f - ∇μ - g∇σ)/σ (definitions B1).
-    const FieldSample mean = process_->mean->sample(l.origin), sigma = process_->sigma->sample(l.origin);
+    const FieldSample mean = process_->mean->sample(l.origin),
+                      sigma = process_->sigma->sample(l.origin);
     if (sigma.value > 0) {
       const double g = (start.state.value - mean.value) / sigma.value;
       const Vec3 gradient =
@@ -128,7 +131,8 @@ GradientLaw ProcessSurface::gradient_law(const Line& line, double t) const {
     sigma = process_->sigma->sample(p);
     path_at(*planned_, l, t, g, dg);
   }
-  // ∇f = ∇μ + g∇σ + σ∇g, ∇g = Bᵀ(γ₁e₁ + γ₂e₂ + g'e_d); γ(q) = cγ(0) + √(1-c²)ξ, c = exp(-q²/2) (math.md §2, §4).
+  // ∇f = ∇μ + g∇σ + σ∇g, ∇g = Bᵀ(γ₁e₁ + γ₂e₂ + g'e_d); γ(q) = cγ(0) + √(1-c²)ξ, c = exp(-q²/2)
+  // (math.md §2, §4).
   const double q = l.q_of(t);
   const double c = l.has_gamma ? std::exp(-0.5 * q * q) : 0;
   const double one_minus_c2 = l.has_gamma ? -std::expm1(-q * q) : 1;
@@ -154,7 +158,8 @@ Vec3 ProcessSurface::world_gradient(const State& state) const {
 
 Start ProcessSurface::start_from(const State* remembered) const {
   if (!remembered) return {};
-  // A certain surface has nothing to forget (B2): the ray starts on it and leaves along its gradient.
+  // A certain surface has nothing to forget (B2): the ray starts on it and leaves along its
+  // gradient.
   if (planned_->sigma_max == 0) return {Start::Kind::value_slope, *remembered};
   if (memory_ == Memory::none) return {};
   if (memory_ == Memory::renewal) return {Start::Kind::value, *remembered};
@@ -171,10 +176,12 @@ std::vector<std::pair<std::string, std::string>> ProcessSurface::plan() const {
   const Range sigma = process_->sigma->range();
   return {{"sampler", planned_->sampler_reason},
           {"memory", memories[static_cast<int>(memory_)]},
-          {"sigma", sigma.min == sigma.max ? "constant " + number(sigma.min)
-                                           : "varies, " + number(sigma.min) + " to " + number(sigma.max)},
+          {"sigma", sigma.min == sigma.max
+                        ? "constant " + number(sigma.min)
+                        : "varies, " + number(sigma.min) + " to " + number(sigma.max)},
           {"certainly_absent", "where the mean exceeds " + number(planned_->skip_threshold) + " (" +
-                                   number(planned_->skip_deviations) + " standard deviations): nothing is drawn"}};
+                                   number(planned_->skip_deviations) +
+                                   " standard deviations): nothing is drawn"}};
 }
 
 }  // namespace gpis

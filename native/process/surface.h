@@ -1,6 +1,7 @@
-// A process placed in the world and planned for rendering: the one face of native/process that the integrator sees.
-// Immutable while rendering; shared by all threads. Spaces: everything named `object` is in the process's own space,
-// the ray parameter t is common to both (a world ray maps to object space without normalising its direction, B12).
+// A process placed in the world and planned for rendering: the one face of native/process that the
+// integrator sees. Immutable while rendering; shared by all threads. Spaces: everything named
+// `object` is in the process's own space, the ray parameter t is common to both (a world ray maps
+// to object space without normalising its direction, B12).
 #pragma once
 
 #include <functional>
@@ -24,17 +25,19 @@ struct State {
 // What a new line is conditioned on at t = 0 (definitions B1-B4).
 struct Start {
   enum class Kind {
-    outside,      // f > 0 and nothing else: camera rays, entry into bounds, memory none
-    value,        // f = value; value 0 is the surface itself: slope flux-weighted (B3); value > 0: slope free
+    outside,  // f > 0 and nothing else: camera rays, entry into bounds, memory none
+    value,  // f = value; value 0 is the surface itself: slope flux-weighted (B3); value > 0: slope
+            // free
     value_slope,  // f = value and ∇f = gradient (Renewal+)
   };
   Kind kind = Kind::outside;
   State state;
 };
 
-// Gradient at a point of a line, given the line sample (t, ∂_d f): ∇f = mean + ξ₁ b1 + ξ₂ b2, ξ iid N(0,1), world space.
-// b1, b2 are orthogonal to the ray direction in the sense b·d = 0, so every draw has the same ∂_d f. `degenerate`: the
-// gradient is (all but) determined, σ = 0 or a remembered gradient over a very short flight; no density is to be used (B10).
+// Gradient at a point of a line, given the line sample (t, ∂_d f): ∇f = mean + ξ₁ b1 + ξ₂ b2, ξ iid
+// N(0,1), world space. b1, b2 are orthogonal to the ray direction in the sense b·d = 0, so every
+// draw has the same ∂_d f. `degenerate`: the gradient is (all but) determined, σ = 0 or a
+// remembered gradient over a very short flight; no density is to be used (B10).
 struct GradientLaw {
   Vec3 mean, b1, b2;
   bool degenerate = false;
@@ -45,7 +48,8 @@ struct GradientLaw {
   }
 };
 
-// One ray through one process. Reused from ray to ray (keeps its buffers); `first_hit` starts a new sample path.
+// One ray through one process. Reused from ray to ray (keeps its buffers); `first_hit` starts a new
+// sample path.
 class Line {
  public:
   Line();
@@ -63,31 +67,37 @@ class Line {
 
 class ProcessSurface {
  public:
-  // Throws std::invalid_argument with a sentence where the process cannot be rendered (σ negative, singular transform, …).
-  ProcessSurface(std::shared_ptr<const GaussianProcess> process, const Affine& object_to_world, Memory memory,
-                 Sampler sampler, double missed_root);
+  // Throws std::invalid_argument with a sentence where the process cannot be rendered (σ negative,
+  // singular transform, …).
+  ProcessSurface(std::shared_ptr<const GaussianProcess> process, const Affine& object_to_world,
+                 Memory memory, Sampler sampler, double missed_root);
 
   Memory memory() const { return memory_; }
   const GaussianProcess& process() const { return *process_; }
   // World-space box outside of which there is certainly no surface (infinite where unbounded).
   const Box3& bounds() const { return world_bounds_; }
 
-  // The first t in (0, t_max) where f changes to f <= 0, infinity if there is none. `line` holds the sample path
-  // afterwards. `ray.direction` has unit length.
-  double first_hit(Line& line, const Ray& ray, double t_max, const Start& start, Rng& rng, Counters& counters) const;
+  // The first t in (0, t_max) where f changes to f <= 0, infinity if there is none. `line` holds
+  // the sample path afterwards. `ray.direction` has unit length.
+  double first_hit(Line& line, const Ray& ray, double t_max, const Start& start, Rng& rng,
+                   Counters& counters) const;
 
-  // True if the line of the last first_hit was sampled at t (so that its state there must be remembered, B1/B5).
+  // True if the line of the last first_hit was sampled at t (so that its state there must be
+  // remembered, B1/B5).
   bool sampled_at(const Line& line, double t) const;
-  // Law of the world gradient at t given the sample path. Only where sampled_at(line, t) or t is the hit.
+  // Law of the world gradient at t given the sample path. Only where sampled_at(line, t) or t is
+  // the hit.
   GradientLaw gradient_law(const Line& line, double t) const;
   // f at t on the sample path (0 at the hit).
   double value(const Line& line, double t) const;
 
-  // A world gradient, drawn from gradient_law or chosen by light sampling, as the state to remember (object space).
+  // A world gradient, drawn from gradient_law or chosen by light sampling, as the state to remember
+  // (object space).
   State state(double value, const Vec3& world_gradient) const;
   Vec3 world_gradient(const State& state) const;
 
-  // The start of a ray that leaves a point with this remembered state, under this object's memory model.
+  // The start of a ray that leaves a point with this remembered state, under this object's memory
+  // model.
   Start start_from(const State* remembered) const;
 
   // Human-readable facts for scene.plan().
@@ -101,8 +111,8 @@ class ProcessSurface {
   std::shared_ptr<const PlannedLine> planned_;
 };
 
-// Random starts (also used by tests): N(0,1) truncated to (a, ∞), and the flux-weighted normal z ~ z₊ N(z; a, 1)
-// (formulas C5, C6).
+// Random starts (also used by tests): N(0,1) truncated to (a, ∞), and the flux-weighted normal z ~
+// z₊ N(z; a, 1) (formulas C5, C6).
 double truncated_normal(double a, Rng& rng);
 double flux_weighted_normal(double a, Rng& rng);
 
