@@ -1,0 +1,63 @@
+"""The benchmarks: python tests/bench/run.py [NAME...] runs those whose name contains a NAME, or all.
+
+A benchmark is a function bench_*() in a file bench_*.py here. It measures and returns one row (a dict of column to
+number or text) or a list of rows. The table goes to the screen, everything to out/bench/results.json. Times are for
+people to compare on one machine; no test depends on them.
+"""
+
+import importlib.util
+import json
+import os
+import platform
+import sys
+import time
+from pathlib import Path
+
+import gpis_native as gn
+
+HERE = Path(__file__).parent
+OUT = HERE.parents[1] / "out" / "bench"
+
+
+def discover():
+    for path in sorted(HERE.glob("bench_*.py")):
+        spec = importlib.util.spec_from_file_location(path.stem, path)
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        for name, function in vars(module).items():
+            if name.startswith("bench_") and callable(function):
+                yield f"{path.stem.removeprefix('bench_')}.{name.removeprefix('bench_')}", function
+
+
+def text(value):
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def print_table(rows):
+    columns = list(dict.fromkeys(key for row in rows for key in row))
+    cells = [columns] + [[text(row.get(column, "")) for column in columns] for row in rows]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    for line in cells:
+        print("  " + "  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True)))
+
+
+def main(wanted):
+    results = {"machine": {"processor": platform.processor() or platform.machine(), "threads": os.cpu_count()}}
+    results |= {"build": gn.build_info(), "benchmarks": {}}
+    for name, function in discover():
+        if wanted and not any(part in name for part in wanted):
+            continue
+        start = time.perf_counter()
+        rows = function()
+        rows = [rows] if isinstance(rows, dict) else rows
+        print(f"{name} ({time.perf_counter() - start:.1f} s)")
+        print_table(rows)
+        results["benchmarks"][name] = rows
+    if not results["benchmarks"]:
+        sys.exit("there is no such benchmark" if wanted else "there is no benchmark in tests/bench yet")
+    OUT.mkdir(parents=True, exist_ok=True)
+    (OUT / "results.json").write_text(json.dumps(results, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
