@@ -8,5 +8,6 @@ PYBIND11_MODULE(gpis_native, m) {
       "Stochastic implicit surfaces: Gaussian processes, their first hits along rays, and light "
       "transport on them.";
   gpis::bind_build_info(m);
+  gpis::bind_field(m);
   gpis::bind_process(m);
 }

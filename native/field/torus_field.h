@@ -16,7 +16,7 @@ class TorusField final : public Field {
     check_direction("TorusField: axis", axis);
     check_positive("TorusField: minor_radius", minor_radius);
     if (!(std::isfinite(major_) && major_ > minor_))
-      refuse("TorusField: major_radius is ", major_, " and minor_radius ", minor_,
+      reject("TorusField: major_radius is ", major_, " and minor_radius ", minor_,
              "; major_radius must be the greater one.");
   }
 
