@@ -38,7 +38,7 @@ std::string shape_text(const py::array& a) {
 
 void check_points(const Array& points) {
   if (points.ndim() != 2 || points.shape(1) != 3)
-    reject("points has the shape ", shape_text(points), "; a field takes (N, 3).");
+    refuse("points has the shape ", shape_text(points), "; a field takes (N, 3).");
 }
 Vec3 row(const Array& a, py::ssize_t i) {
   return {a.at(i, 0), a.at(i, 1), a.at(i, 2)};
@@ -63,9 +63,9 @@ Array gradients_at(const Field& field, const Array& points) {
 
 Affine affine_argument(const Array& m) {
   if (m.ndim() != 2 || m.shape(0) != 4 || m.shape(1) != 4)
-    reject("transformed: the matrix has the shape ", shape_text(m), "; it takes (4, 4).");
+    refuse("transformed: the matrix has the shape ", shape_text(m), "; it takes (4, 4).");
   if (m.at(3, 0) != 0 || m.at(3, 1) != 0 || m.at(3, 2) != 0 || m.at(3, 3) != 1)
-    reject("transformed: the last row of the matrix is not (0, 0, 0, 1): it takes an affine map.");
+    refuse("transformed: the last row of the matrix is not (0, 0, 0, 1): it takes an affine map.");
   Affine a;
   for (int i = 0; i < 3; ++i) a.linear.row[i] = row(m, i);
   a.translation = {m.at(0, 3), m.at(1, 3), m.at(2, 3)};
@@ -84,7 +84,7 @@ Vec3 voxel_argument(const py::object& value) {
 std::shared_ptr<GridField> make_grid(const Array& values, const py::object& voxel_size,
                                      const Triple& origin, std::optional<double> background) {
   if (values.ndim() != 3)
-    reject("GridField: values has the shape ", shape_text(values), "; it takes (X, Y, Z).");
+    refuse("GridField: values has the shape ", shape_text(values), "; it takes (X, Y, Z).");
   const auto v = values.unchecked<3>();
   std::size_t bad = 0;
   Index3 first{};
@@ -93,7 +93,7 @@ std::shared_ptr<GridField> make_grid(const Array& values, const py::object& voxe
       for (int k = 0; k < v.shape(2); ++k)
         if (!std::isfinite(static_cast<float>(v(i, j, k))) && bad++ == 0) first = {i, j, k};
   if (bad > 0)
-    reject("GridField: ", bad,
+    refuse("GridField: ", bad,
            " of the values are not finite single-precision numbers, the first at [", first[0], ", ",
            first[1], ", ", first[2], "].");
   const Index3 nodes{static_cast<int>(v.shape(0)), static_cast<int>(v.shape(1)),
@@ -179,7 +179,7 @@ field(points (N, 3)) -> (N,); field.gradient(points) -> (N, 3). Fields add to fi
           "line",
           [](const Field& f, const Triple& o, const Triple& d) {
             if (!(length(to_vec(d)) > 0) || !is_finite(to_vec(d)) || !is_finite(to_vec(o)))
-              reject("line: the ray is ", to_vec(o), " + t ", to_vec(d),
+              refuse("line: the ray is ", to_vec(o), " + t ", to_vec(d),
                      "; it takes finite numbers and a direction of non-zero length.");
             return f.line(to_vec(o), to_vec(d));
           },

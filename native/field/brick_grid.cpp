@@ -11,13 +11,13 @@ BrickGrid::BrickGrid(const Index3& nodes, const NodeValue& value, const Constant
   double count = 1;
   for (int axis = 0; axis < 3; ++axis) {
     if (nodes[axis] < 2)
-      reject("The grid has ", nodes[0], " x ", nodes[1], " x ", nodes[2],
+      refuse("The grid has ", nodes[0], " x ", nodes[1], " x ", nodes[2],
              " nodes; interpolation takes at least 2 along each axis.");
     bricks_along_[axis] = (nodes[axis] - 2) / kCells + 1;
     count *= bricks_along_[axis];
   }
   if (count > 2e8)
-    reject("The grid has ", nodes[0], " x ", nodes[1], " x ", nodes[2],
+    refuse("The grid has ", nodes[0], " x ", nodes[1], " x ", nodes[2],
            " nodes, which is too many to index; take a coarser one.");
   bricks_.reserve(static_cast<std::size_t>(count));
 

@@ -9,10 +9,12 @@
 
 namespace gpis {
 
-template <class... Parts>
-[[noreturn]] void reject(const Parts&... parts) {
+// Starts with a literal: refuse(path, sentence) with a path of the scene description is another
+// function.
+template <std::size_t N, class... Parts>
+[[noreturn]] void refuse(const char (&first)[N], const Parts&... parts) {
   std::ostringstream text;
-  (text << ... << parts);
+  ((text << first) << ... << parts);
   throw std::invalid_argument(text.str());
 }
 
@@ -21,21 +23,21 @@ inline std::ostream& operator<<(std::ostream& out, const Vec3& v) {
 }
 
 inline void check_finite(const char* what, double v) {
-  if (!std::isfinite(v)) reject(what, " is ", v, "; it takes a finite number.");
+  if (!std::isfinite(v)) refuse("", what, " is ", v, "; it takes a finite number.");
 }
 inline void check_finite(const char* what, const Vec3& v) {
-  if (!is_finite(v)) reject(what, " is ", v, "; it takes three finite numbers.");
+  if (!is_finite(v)) refuse("", what, " is ", v, "; it takes three finite numbers.");
 }
 inline void check_positive(const char* what, double v) {
-  if (!(std::isfinite(v) && v > 0)) reject(what, " is ", v, "; it takes a positive number.");
+  if (!(std::isfinite(v) && v > 0)) refuse("", what, " is ", v, "; it takes a positive number.");
 }
 inline void check_positive(const char* what, const Vec3& v) {
   if (!(is_finite(v) && v.x > 0 && v.y > 0 && v.z > 0))
-    reject(what, " is ", v, "; it takes three positive numbers.");
+    refuse("", what, " is ", v, "; it takes three positive numbers.");
 }
 inline void check_direction(const char* what, const Vec3& v) {
   if (!(is_finite(v) && length(v) > 0))
-    reject(what, " is ", v, "; it takes a direction of non-zero length.");
+    refuse("", what, " is ", v, "; it takes a direction of non-zero length.");
 }
 
 }  // namespace gpis

@@ -11,7 +11,7 @@ class ClampedField final : public Field {
   ClampedField(FieldPtr field, double low, double high)
       : field_(std::move(field)), low_(low), high_(high) {
     if (!(low <= high))
-      reject("clamped: low is ", low, " and high is ", high, "; low must not exceed high.");
+      refuse("clamped: low is ", low, " and high is ", high, "; low must not exceed high.");
   }
 
   double value(const Vec3& p) const override { return clamp(field_->value(p)); }

@@ -16,7 +16,7 @@ class TorusField final : public Field {
     check_direction("TorusField: axis", axis);
     check_positive("TorusField: minor_radius", minor_radius);
     if (!(std::isfinite(major_) && major_ > minor_))
-      reject("TorusField: major_radius is ", major_, " and minor_radius ", minor_,
+      refuse("TorusField: major_radius is ", major_, " and minor_radius ", minor_,
              "; major_radius must be the greater one.");
   }
 
@@ -68,11 +68,14 @@ class TorusField final : public Field {
       return above_by_lipschitz(value, length(direction_), t, t_end, threshold);
     }
     FieldSample sample(double t) const override {
-      if (t == nearest_axis_) t += (middle_ - t) * 1e-9;
-      return field_->sample(origin_ + direction_ * t);
+      FieldSample s = at(t);
+      if (t == nearest_axis_) s.gradient = at(t + (middle_ - t) * 1e-9).gradient;
+      return s;
     }
 
    private:
+    FieldSample at(double t) const { return field_->sample(origin_ + direction_ * t); }
+
     const TorusField* field_;
     Vec3 origin_, direction_;
     double nearest_axis_, middle_ = 0;

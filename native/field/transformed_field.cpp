@@ -29,7 +29,7 @@ TransformedField::TransformedField(FieldPtr field, const Affine& matrix)
   const Eigen::Vector3d stretch = m.jacobiSvd().singularValues();
   const double least = stretch[2];
   if (!(least > 1e-12 * stretch[0]))
-    reject("transformed: the matrix stretches by ", stretch[0], " at most and ", least,
+    refuse("transformed: the matrix stretches by ", stretch[0], " at most and ", least,
            " at least; it must not flatten space.");
   inverse_ = inverse(matrix);
   gradient_map_ = transpose(inverse_.linear);
