@@ -1,7 +1,8 @@
 """One render: rounds of samples on a worker thread, polled by the thread that asked for it. No Blender type in here.
 
 The worker calls the native renderer; its progress callback only reads and writes plain values under a lock, so
-nothing of Blender is ever touched from a thread that Blender does not know.
+nothing of Blender is ever touched from a thread that Blender does not know. Rounds are slices that merge exactly: the
+image is that of one call, and an artist sees it grow.
 """
 
 import math
@@ -11,6 +12,8 @@ from dataclasses import dataclass, field
 
 # The film's block: 16 consecutive samples are one independent randomisation, slices must be unions of blocks.
 BLOCK = 16
+# Below this the error is estimated from too few blocks to stop by.
+MINIMUM_FOR_NOISE = 4 * BLOCK
 
 
 @dataclass(frozen=True)
@@ -27,12 +30,18 @@ class Limits:
         if self.samples is None and self.time_limit is None and self.noise_threshold is None:
             raise ValueError("Nothing ends this render: set samples, a time limit or a noise threshold.")
 
+    def samples_for_noise(self, samples, error):
+        """Samples at which the error should have fallen to the threshold, as it goes with 1/samples; None: unknown."""
+        if self.noise_threshold is None or not samples or error is None:
+            return None
+        return max(MINIMUM_FOR_NOISE, samples * error / self.noise_threshold**2)
+
 
 @dataclass(frozen=True)
 class Round:
-    """What to do next: `samples` more (None: the render is over, `stop` says why)."""
+    """What to do next: `samples` more (0: the render is over, `stop` says why)."""
 
-    samples: int | None
+    samples: int
     time_left: float | None = None
     stop: str = ""
 
@@ -40,23 +49,21 @@ class Round:
 def next_round(limits, samples, seconds, error):
     """The next round after `samples` in `seconds` with relMSE `error` (None: unknown).
 
-    Rounds double, so that pictures come early and their cost stays a fraction of the render. Noise falls with
-    1/samples: the last round is cut to what the threshold needs.
+    Rounds double, so that pictures come early and their cost stays a fraction of the render; the last is cut to what
+    the noise threshold needs.
     """
     if limits.samples is not None and samples >= limits.samples:
-        return Round(None, stop="samples")
+        return Round(0, stop="samples")
     if samples and limits.time_limit is not None and seconds >= limits.time_limit:
-        return Round(None, stop="time limit")
+        return Round(0, stop="time limit")
     count = max(BLOCK, samples)
-    if limits.noise_threshold is not None and samples and error is not None:
-        if math.sqrt(error) <= limits.noise_threshold:
-            return Round(None, stop="noise threshold")
-        needed = math.ceil(samples * error / limits.noise_threshold**2) - samples
-        count = min(count, needed)
-    # Rounds are whole blocks; only the very last may end inside one.
-    count = max(BLOCK, -(-count // BLOCK) * BLOCK)
+    needed = limits.samples_for_noise(samples, error)
+    if needed is not None:
+        if samples >= needed:
+            return Round(0, stop="noise threshold")
+        count = min(count, math.ceil((needed - samples) / BLOCK) * BLOCK)
     if limits.samples is not None:
-        count = min(count, limits.samples - samples)
+        count = min(count, limits.samples - samples)  # only the last round may end inside a block
     time_left = None if limits.time_limit is None else max(limits.time_limit - seconds, 0.001)
     return Round(count, time_left)
 
@@ -116,7 +123,7 @@ class Session:
         self._failure = None
         self._result = None
         self._progress = Progress()
-        self._samples_needed = 0.0  # for the noise threshold, by the newest estimate
+        self._samples_needed = None  # for the noise threshold, by the newest estimate
         self._began = time.monotonic()
         self._thread = threading.Thread(target=self._work, name="gpis-render", daemon=True)
 
@@ -162,7 +169,7 @@ class Session:
         while True:
             seconds = time.monotonic() - self._began
             step = next_round(self.limits, samples, seconds, error)
-            if step.samples is None:
+            if not step.samples:
                 self.stop = step.stop
                 return
             part = self.renderer.render(
@@ -174,28 +181,41 @@ class Session:
                 first_sample=samples,
                 seed=self.limits.seed,
                 threads=self.limits.threads,
-                progress=self._reporter(samples, step.samples),
+                progress=self._reporter(samples),
             )
-            if self._cancel:
-                self.stop = "cancelled"
+            cancelled = part.stats["cancelled"]
+            if cancelled and self._result is None:
+                self.stop = "cancelled"  # some pixels have no sample yet: no picture
                 return
             result = part if self._result is None else self.renderer.merge([self._result, part])
-            seconds = time.monotonic() - self._began
-            samples = int(result.passes["sample_count"].max())
-            error = result.history[-1]["estimated_error"] if result.history else None
-            with self._lock:
-                self._result = result
-                self.history.append({"seconds": seconds, "samples": samples, "estimated_error": error})
-                if self.limits.noise_threshold is not None and error is not None:
-                    self._samples_needed = samples * error / self.limits.noise_threshold**2
-                fraction = self._fraction(samples)
-                self._progress = Progress(fraction, seconds, samples, _root(error), len(self.history))
+            samples += step.samples
+            error = result.stats["estimated_error"]
+            error = error if math.isfinite(error) else None
+            self._keep(result, samples, error)
+            if cancelled or part.stats["stopped_by"] == "time":
+                self.stop = "cancelled" if cancelled else "time limit"
+                return
 
-    def _reporter(self, first, count):
+    def _keep(self, result, samples, error):
+        seconds = time.monotonic() - self._began
+        with self._lock:
+            self._result = result
+            self.history.append({"seconds": seconds, "samples": result.stats["samples"], "estimated_error": error})
+            self._samples_needed = self.limits.samples_for_noise(samples, error)
+            self._progress = Progress(
+                self._fraction(samples),
+                seconds,
+                samples,
+                None if error is None else math.sqrt(error),
+                len(self.history),
+            )
+
+    def _reporter(self, first):
         def report(fraction, stats):
+            done = first + stats["samples"]
             with self._lock:
-                self._progress.samples = first + int(fraction * count)
-                self._progress.fraction = self._fraction(first + fraction * count)
+                self._progress.samples = int(done)
+                self._progress.fraction = self._fraction(done)
                 return not self._cancel
 
         return report
@@ -207,10 +227,6 @@ class Session:
             parts.append(samples / self.limits.samples)
         if self.limits.time_limit is not None:
             parts.append((time.monotonic() - self._began) / self.limits.time_limit)
-        if self._samples_needed > 0:
+        if self._samples_needed is not None:
             parts.append(samples / self._samples_needed)
         return min(1.0, max(parts))
-
-
-def _root(error):
-    return None if error is None else math.sqrt(error)

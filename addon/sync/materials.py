@@ -41,7 +41,7 @@ def _name(sync, material):
 
 def describe(sync, material):
     owner = f'Material "{material.name}"'
-    if not material.use_nodes or material.node_tree is None:
+    if material.node_tree is None or not material.use_nodes:
         return {"type": "lambert", "color": tuple(material.diffuse_color[:3])}  # as Cycles shades it
     node = nodes.shader_of(material.node_tree)
     if node is None:
@@ -57,7 +57,13 @@ def describe(sync, material):
     for socket in node.inputs:
         if socket.name in {"Normal", "Tangent", "Coat Normal"} and socket.is_linked:
             sync.warn(f'{owner}: the link on {socket.name} of node "{node.name}" is not converted.')
-    return convert(sync, owner, node)
+    result = convert(sync, owner, node)
+    if not all(0 <= part <= 1 for part in result["color"]):
+        sync.warn(
+            f'{owner}: the colour of node "{node.name}" is cut to 0..1, no surface reflects more than it receives.'
+        )
+        result["color"] = tuple(min(max(part, 0.0), 1.0) for part in result["color"])
+    return result
 
 
 def _diffuse(sync, owner, node):

@@ -90,8 +90,14 @@ class GPIS_ViewLayerProperties(bpy.types.PropertyGroup):
     use_pass_sample_count: BoolProperty(name="Sample Count", description="Samples taken for the pixel", default=False)
 
 
+def _tag(settings, context):
+    """A render that keeps its data between frames must see the change."""
+    settings.id_data.update_tag()
+
+
 def _on_enabled(settings, context):
     """σ and ℓ that fit the object's size, and the mean grid where the file leaves no choice."""
+    _tag(settings, context)
     data = settings.id_data.data
     if not settings.enabled or not isinstance(data, bpy.types.Volume):
         return
@@ -122,6 +128,7 @@ class GPIS_ObjectProperties(bpy.types.PropertyGroup):
         name="Mean",
         description="Grid of the mean: positive outside. A signed distance, or any field with the surface at 0",
         search=_grid_names,
+        update=_tag,
     )
     sigma_source: EnumProperty(
         name="σ from",
@@ -131,6 +138,7 @@ class GPIS_ObjectProperties(bpy.types.PropertyGroup):
             ("GRID", "Grid", "A grid of the file, varying over the object"),
         ),
         default="CONSTANT",
+        update=_tag,
     )
     sigma: FloatProperty(
         name="Standard Deviation σ",
@@ -141,9 +149,10 @@ class GPIS_ObjectProperties(bpy.types.PropertyGroup):
         precision=4,
         step=1,
         subtype="DISTANCE",
+        update=_tag,
     )
     sigma_grid: StringProperty(
-        name="Grid", description="Grid of the standard deviation or variance", search=_grid_names
+        name="Grid", description="Grid of the standard deviation or variance", search=_grid_names, update=_tag
     )
     sigma_meaning: EnumProperty(
         name="Holds",
@@ -154,15 +163,23 @@ class GPIS_ObjectProperties(bpy.types.PropertyGroup):
             ("VARIANCE", "Variance (σ²)", "The grid holds σ²: its square root is taken"),
         ),
         default="UNSET",
+        update=_tag,
     )
     sigma_factor: FloatProperty(
-        name="Factor", description="σ is the grid's value times this", default=1.0, min=0.0, soft_max=10.0, precision=3
+        name="Factor",
+        description="σ is the grid's value times this",
+        default=1.0,
+        min=0.0,
+        soft_max=10.0,
+        precision=3,
+        update=_tag,
     )
     kernel: EnumProperty(
         name="Kernel",
         description="Correlation of the surface's displacement between two points, over their distance",
         items=(("SQUARED_EXPONENTIAL", "Squared Exponential", "Smooth bumps of one size"),),
         default="SQUARED_EXPONENTIAL",
+        update=_tag,
     )
     length_scale: FloatProperty(
         name="Length Scale ℓ",
@@ -173,6 +190,7 @@ class GPIS_ObjectProperties(bpy.types.PropertyGroup):
         precision=4,
         step=1,
         subtype="DISTANCE",
+        update=_tag,
     )
     memory: EnumProperty(
         name="Memory",
@@ -183,6 +201,7 @@ class GPIS_ObjectProperties(bpy.types.PropertyGroup):
             ("RENEWAL_PLUS", "Renewal+", "The point it left and the slope there: closest to a real rough surface"),
         ),
         default="RENEWAL_PLUS",
+        update=_tag,
     )
     source: PointerProperty(
         name="Source", description="Mesh that the signed distance is baked from", type=bpy.types.Object
