@@ -13,12 +13,12 @@
 namespace gpis {
 
 struct SettingsDescription {
-  std::optional<int> max_bounces;  // none = unlimited
+  std::optional<int> max_bounces;  // indirect bounces: 0 = direct light only; none = unlimited
   double missed_root = 1e-3;       // probability of a missed root per ray
   enum class Filter { box, blackman_harris } filter = Filter::box;
   double filter_width = 1;
   double clamp = 0;  // 0 = off
-  bool light_sampling = true;
+  bool light_sampling = true;  // next-event estimation; a constant world colour is never sampled
 };
 
 struct CameraDescription {
@@ -33,8 +33,10 @@ struct CameraDescription {
 struct WorldDescription {
   Color color;                 // used where there is no image
   int image_width = 0, image_height = 0;
-  std::vector<float> image;    // (H, W, 3), equirectangular, row 0 at the bottom; empty = constant colour
-  Mat3 matrix;                 // image space -> world
+  // (H, W, 3), row 0 at the bottom; empty = constant colour. Equirectangular as in Blender: the direction (x, y, z) of image
+  // space is at u = 1/2 - atan2(y, x)/2pi, v = 1/2 + atan2(z, hypot(x, y))/pi; the middle of the image is +x, the top +z.
+  std::vector<float> image;
+  Mat3 matrix;                 // image space -> world, a rotation (a reflection is allowed)
   double strength = 1;
 };
 
@@ -43,13 +45,14 @@ struct LightDescription {
   std::string name;
   Affine matrix;               // shines along -z
   Color color{1, 1, 1};
-  double power = 1;            // W; sun: irradiance, W/m²
+  double power = 1;            // W in all directions; sun: irradiance on a plane that faces it, W/m²
   std::optional<Color> radiance;  // area: instead of power
   double size_x = 1, size_y = 1;
   bool ellipse = false;
-  double radius = 0;           // point, spot
+  double radius = 0;           // point, spot: of a sphere of constant radiance (Blender: soft falloff off); 0 = a point
   double angle = 0;            // sun: full angle of its disk; spot: full cone angle
   double blend = 0;            // spot: soft edge, 0..1
+  bool visible_to_camera = false;  // as Blender's default for lights; reflections show lights in any case
 };
 
 struct MaterialDescription {
@@ -64,7 +67,8 @@ struct MeshDescription {
   std::string name;
   std::vector<float> vertices;         // (N, 3)
   std::vector<std::uint32_t> triangles;  // (M, 3)
-  std::vector<float> normals;          // (N, 3) per vertex, or (M, 3, 3) per corner, or empty = flat
+  std::vector<float> normals;          // (N, 3) per vertex, (M, 3, 3) per corner, or empty = flat
+  bool normals_per_corner = false;
   std::vector<std::int32_t> material_index;  // (M) or empty = 0
 };
 
