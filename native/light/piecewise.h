@@ -1,0 +1,59 @@
+// Discrete distributions by inversion of their cumulative sums, in one and two dimensions.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+namespace gpis {
+
+// Entries i with probability weight[i]/Σ weight; all equal to 0 if all weights are.
+class Piecewise1D {
+ public:
+  Piecewise1D() = default;
+  explicit Piecewise1D(const std::vector<double>& weights) {
+    cumulative_.reserve(weights.size() + 1);
+    cumulative_.push_back(0);
+    for (const double w : weights) cumulative_.push_back(cumulative_.back() + w);
+  }
+  double sum() const { return cumulative_.back(); }
+  double probability(int i) const {
+    return sum() > 0 ? (cumulative_[i + 1] - cumulative_[i]) / sum() : 0;
+  }
+  // u in [0, 1). An entry of weight zero is never chosen.
+  int sample(double u) const {
+    const double target = u * sum();
+    auto it = std::upper_bound(cumulative_.begin() + 1, cumulative_.end() - 1, target);
+    auto i = it - cumulative_.begin() - 1;
+    // Rounding of u·sum up to the sum itself may point behind the last entry with weight.
+    while (i > 0 && cumulative_[i + 1] == cumulative_[i]) --i;
+    return static_cast<int>(i);
+  }
+
+ private:
+  std::vector<double> cumulative_{0};
+};
+
+// Cells (i, j) of a table with `width` columns, row by row: first the row, then the column in it.
+class Piecewise2D {
+ public:
+  Piecewise2D(const std::vector<double>& weights, int width) {
+    std::vector<double> sums;
+    for (auto row = weights.begin(); row != weights.end(); row += width) {
+      columns_.emplace_back(std::vector<double>(row, row + width));
+      sums.push_back(columns_.back().sum());
+    }
+    rows_ = Piecewise1D(sums);
+  }
+  std::pair<int, int> sample(double u1, double u2) const {
+    const int j = rows_.sample(u1);
+    return {columns_[j].sample(u2), j};
+  }
+  double probability(int i, int j) const { return rows_.probability(j) * columns_[j].probability(i); }
+
+ private:
+  Piecewise1D rows_;
+  std::vector<Piecewise1D> columns_;
+};
+
+}  // namespace gpis

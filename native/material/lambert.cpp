@@ -1,0 +1,31 @@
+// Lambertian reflection: BRDF color/π.
+#include "core/warp.h"
+#include "material/material.h"
+
+namespace gpis {
+namespace {
+
+class Lambert final : public Material {
+ public:
+  explicit Lambert(const Color& color) : color_(color) {}
+
+  Color eval(const Vec3& wo, const Vec3& wi) const override { return color_ * pdf(wo, wi); }
+  double pdf(const Vec3&, const Vec3& wi) const override { return std::max(0.0, wi.z) / kPi; }
+  std::optional<MaterialSample> sample(const Vec3& wo, Rng& rng) const override {
+    const double u1 = rng.uniform(), u2 = rng.uniform();
+    const Vec3 wi = square_to_cosine_hemisphere(u1, u2);
+    return MaterialSample{wi, color_, pdf(wo, wi)};
+  }
+  Color albedo() const override { return color_; }
+
+ private:
+  Color color_;
+};
+
+}  // namespace
+
+std::unique_ptr<Material> make_lambert(const Color& color) {
+  return std::make_unique<Lambert>(color);
+}
+
+}  // namespace gpis

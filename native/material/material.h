@@ -1,0 +1,48 @@
+// Micro-BRDFs: how light scatters at a point whose normal is known. Directions are unit vectors in the local frame of that
+// normal (0, 0, 1); `wo` points back along the ray and has wo.z > 0. Adding a material: one file, one line in the table of
+// scene/scene.cpp.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "core/rng.h"
+#include "core/vec.h"
+
+namespace gpis {
+
+struct MaterialSample {
+  Vec3 wi;
+  Color weight;     // eval / pdf
+  double pdf = 0;   // per solid angle; meaningless if specular
+  bool specular = false;
+};
+
+class Material {
+ public:
+  virtual ~Material() = default;
+  // BRDF · cos θ_i; zero below the surface, and for specular parts.
+  virtual Color eval(const Vec3& wo, const Vec3& wi) const = 0;
+  virtual double pdf(const Vec3& wo, const Vec3& wi) const = 0;
+  // Nothing where the light is absorbed (the loss of single scattering on rough metals).
+  virtual std::optional<MaterialSample> sample(const Vec3& wo, Rng& rng) const = 0;
+  // What the albedo pass shows.
+  virtual Color albedo() const = 0;
+  // True if all light goes in one direction: eval and pdf are zero, and this much is reflected at angle of incidence θ.
+  virtual bool specular() const { return false; }
+  virtual Color specular_reflectance(double /*cos θ*/) const { return {}; }
+};
+
+std::unique_ptr<Material> make_lambert(const Color& color);
+// Reflects `color` at normal incidence and `edge` at grazing angles (Schlick between).
+std::unique_ptr<Material> make_mirror(const Color& color, const Color& edge);
+// Single scattering at a GGX surface with the same reflectance `color` at all angles, as Blender's Glossy node ("GGX").
+std::unique_ptr<Material> make_conductor(const Color& color, double roughness);
+// A subset of Blender's Principled node: metallic mixes a GGX metal (Schlick, normal reflectance = color) with a Lambertian
+// base under a dielectric GGX coat of index 1.5. No transmission, subsurface, clearcoat, sheen or multiple scattering.
+std::unique_ptr<Material> make_principled(const Color& color, double roughness, double metallic);
+
+// Rougher than this is a microfacet surface, smoother is a mirror: GGX α = roughness² would be below 1e-4.
+inline constexpr double kSmoothRoughness = 0.01;
+
+}  // namespace gpis
