@@ -8,6 +8,7 @@
   X(camera_paths, "camera paths traced")                                                   \
   X(path_vertices, "surface interactions")                                                 \
   X(path_length_limit, "paths ended by the safety limit on their length")                  \
+  X(states_inside, "processes found inside where another surface was hit (a missed root): forgotten there")        \
   X(shadow_rays, "visibility rays towards lights")                                         \
   X(mesh_rays, "rays handed to Embree")                                                    \
   X(line_segments, "rays that met an uncertain region of a process")                       \

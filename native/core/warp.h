@@ -21,8 +21,8 @@ inline Vec3 square_to_cosine_hemisphere(double u1, double u2) {
   return {r * std::cos(phi), r * std::sin(phi), std::sqrt(1 - u1)};
 }
 
-// Uniform in the cone about +z with 1 - cos(half angle) = `cap`; density 1/(2π cap). The argument is `cap` and not the
-// cosine because the cosine of a small cone rounds to 1.
+// Uniform in the cone about +z with 1 - cos(half angle) = `cap`; density 1/(2π cap). The argument
+// is `cap` and not the cosine because the cosine of a small cone rounds to 1.
 inline Vec3 square_to_cone(double u1, double u2, double cap) {
   const double below = u1 * cap;  // 1 - cos θ
   const double sin = std::sqrt(std::max(0.0, below * (2 - below))), phi = 2 * kPi * u2;

@@ -29,7 +29,9 @@ Vec3 vertex(const TriangleMesh& mesh, std::uint32_t i) {
   return {mesh.vertices[3 * i], mesh.vertices[3 * i + 1], mesh.vertices[3 * i + 2]};
 }
 
-double largest(const Vec3& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
+double largest(const Vec3& v) {
+  return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+}
 
 RTCRay to_embree(const Ray& ray, double t_max) {
   RTCRay r{};
@@ -77,7 +79,8 @@ struct TriangleScene::Impl {
   }
 
   // The triangles of a mesh under a transform, baked.
-  void attach_triangles(RTCScene scene, const TriangleMesh& mesh, const Affine& transform, unsigned id) const {
+  void attach_triangles(RTCScene scene, const TriangleMesh& mesh, const Affine& transform,
+                        unsigned id) const {
     RTCGeometry geometry = embree().rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_TRIANGLE);
     const std::size_t vertices = mesh.vertices.size() / 3;
     auto* position = static_cast<float*>(embree().rtcSetNewGeometryBuffer(
@@ -107,10 +110,14 @@ struct TriangleScene::Impl {
   }
 };
 
-TriangleScene::TriangleScene() : impl_(std::make_unique<Impl>()) { impl_->check("make a device"); }
+TriangleScene::TriangleScene() : impl_(std::make_unique<Impl>()) {
+  impl_->check("make a device");
+}
 TriangleScene::~TriangleScene() = default;
 
-void TriangleScene::add_mesh(const TriangleMesh& mesh) { impl_->meshes.push_back(mesh); }
+void TriangleScene::add_mesh(const TriangleMesh& mesh) {
+  impl_->meshes.push_back(mesh);
+}
 
 void TriangleScene::add_instance(int mesh, const Affine& to_world) {
   const Mat3& m = to_world.linear;
@@ -151,7 +158,8 @@ Box3 TriangleScene::bounds() const {
   return {{b.lower_x, b.lower_y, b.lower_z}, {b.upper_x, b.upper_y, b.upper_z}};
 }
 
-bool TriangleScene::intersect(const Ray& ray, double t_max, MeshHit& hit, Counters& counters) const {
+bool TriangleScene::intersect(const Ray& ray, double t_max, MeshHit& hit,
+                              Counters& counters) const {
   ++counters.mesh_rays;
   RTCRayHit r{};
   r.ray = to_embree(ray, t_max);
@@ -159,7 +167,8 @@ bool TriangleScene::intersect(const Ray& ray, double t_max, MeshHit& hit, Counte
   embree().intersect1(impl_->top.get(), &r);
   if (r.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
 
-  hit.instance = static_cast<int>(r.hit.instID[0] == RTC_INVALID_GEOMETRY_ID ? r.hit.geomID : r.hit.instID[0]);
+  hit.instance =
+      static_cast<int>(r.hit.instID[0] == RTC_INVALID_GEOMETRY_ID ? r.hit.geomID : r.hit.instID[0]);
   const Instance& instance = impl_->instances[hit.instance];
   const TriangleMesh& mesh = impl_->meshes[instance.mesh];
   const std::uint32_t* corner = &mesh.triangles[3 * std::size_t{r.hit.primID}];
@@ -177,7 +186,10 @@ bool TriangleScene::intersect(const Ray& ray, double t_max, MeshHit& hit, Counte
     Vec3 n;
     for (int k = 0; k < 3; ++k) {
       const std::size_t i = mesh.normals_per_corner ? 3 * std::size_t{r.hit.primID} + k : corner[k];
-      n += Vec3{mesh.normals[3 * i], mesh.normals[3 * i + 1], mesh.normals[3 * i + 2]} * (k == 0 ? w : k == 1 ? u : v);
+      n += Vec3{mesh.normals[3 * i], mesh.normals[3 * i + 1], mesh.normals[3 * i + 2]} * (k == 0 ? w
+                                                                                          : k == 1
+                                                                                              ? u
+                                                                                              : v);
     }
     n = instance.normal_to_world * n;
     const double size = length(n);
@@ -188,10 +200,12 @@ bool TriangleScene::intersect(const Ray& ray, double t_max, MeshHit& hit, Counte
     }
   }
   hit.material_index = mesh.material_index.empty() ? 0 : mesh.material_index[r.hit.primID];
-  // Rounding in single precision grows with the coordinates that entered the computation, in world and in object space (the
-  // argument and the factor of Wächter & Binder 2019, "A fast and robust method for avoiding self-intersection": 256 ulp).
-  const double magnitude = std::max({largest(hit.position), largest(instance.to_world.translation),
-                                     instance.scale * std::max({largest(a), largest(b), largest(c)})});
+  // Rounding in single precision grows with the coordinates that entered the computation, in world
+  // and in object space (the argument and the factor of Wächter & Binder 2019, "A fast and robust
+  // method for avoiding self-intersection": 256 ulp).
+  const double magnitude =
+      std::max({largest(hit.position), largest(instance.to_world.translation),
+                instance.scale * std::max({largest(a), largest(b), largest(c)})});
   hit.offset = 256 * 0x1p-24 * magnitude;
   return true;
 }

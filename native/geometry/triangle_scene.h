@@ -12,9 +12,10 @@ namespace gpis {
 
 // A view of arrays that outlive the TriangleScene.
 struct TriangleMesh {
-  std::span<const float> vertices;               // (N, 3)
-  std::span<const std::uint32_t> triangles;      // (M, 3)
-  std::span<const float> normals;                // (N, 3) per vertex, (M, 3, 3) per corner, or empty: flat
+  std::span<const float> vertices;           // (N, 3)
+  std::span<const std::uint32_t> triangles;  // (M, 3)
+  std::span<const float> normals;            // (N, 3), or (M, 3, 3) per corner, or empty: flat
+  bool normals_per_corner = false;
   std::span<const std::int32_t> material_index;  // (M) or empty: 0
 };
 
@@ -23,7 +24,8 @@ struct MeshHit {
   Vec3 position;          // from the barycentric coordinates: nearer to the triangle than ray.at(t)
   Vec3 geometric_normal;  // unit, either side
   Vec3 shading_normal;    // unit, on the side of the geometric normal
-  double offset = 0;      // along the geometric normal, to a point from which a ray does not meet the same surface again
+  double offset = 0;  // along the geometric normal, to a point from which a ray does not meet the
+                      // same surface again
   int instance = -1;
   int material_index = 0;
 };
@@ -32,10 +34,12 @@ class TriangleScene {
  public:
   TriangleScene();
   ~TriangleScene();
-  // Meshes and instances are numbered from 0 in the order of adding. A mesh with one instance costs no transform of rays.
+  // Meshes and instances are numbered from 0 in the order of adding. A mesh with one instance costs
+  // no transform of rays.
   void add_mesh(const TriangleMesh& mesh);
   void add_instance(int mesh, const Affine& to_world);
-  // Builds the hierarchy; after it, the scene is immutable and shared by threads. Throws std::runtime_error if Embree fails.
+  // Builds the hierarchy; after it, the scene is immutable and shared by threads. Throws
+  // std::runtime_error if Embree fails.
   void commit();
 
   Box3 bounds() const;

@@ -1,5 +1,8 @@
-// Path tracing with next-event estimation and multiple importance sampling, over meshes and stochastic surfaces.
+// Path tracing with next-event estimation and multiple importance sampling, over meshes and
+// stochastic surfaces.
 #pragma once
+
+#include <memory>
 
 #include "core/counters.h"
 #include "core/rng.h"
@@ -9,8 +12,9 @@ namespace gpis {
 
 class Scene;
 
-// One camera sample: radiance and first-hit features. Unset features stay zero, depth infinite. Depth is the distance along
-// the camera ray to its first hit; the camera's `clip` reaches the tracer as the ray's origin (near) and t_max (far).
+// One camera sample: radiance and first-hit features. Unset features stay zero, depth infinite.
+// Depth is the distance along the camera ray to its first hit; the camera's `clip` reaches the
+// tracer as the ray's origin (near) and t_max (far).
 struct PathSample {
   Color radiance;
   double alpha = 1;
@@ -28,7 +32,7 @@ class PathTracer {
 
  private:
   struct Impl;
-  Impl* impl_;
+  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace gpis

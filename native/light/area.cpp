@@ -1,4 +1,5 @@
-// Area light: a one-sided rectangle or ellipse of constant radiance L. Its power is π L times its area.
+// Area light: a one-sided rectangle or ellipse of constant radiance L. Its power is π L times its
+// area.
 #include "core/warp.h"
 #include "light/light.h"
 
@@ -12,8 +13,14 @@ namespace {
 
 class AreaLight final : public Light {
  public:
-  AreaLight(const Vec3& center, const Vec3& u, const Vec3& v, const Vec3& facing, bool ellipse, const Color& radiance)
-      : center_(center), u_(u), v_(v), ellipse_(ellipse), radiance_(radiance), area_(area_of(u, v, ellipse)) {
+  AreaLight(const Vec3& center, const Vec3& u, const Vec3& v, const Vec3& facing, bool ellipse,
+            const Color& radiance)
+      : center_(center),
+        u_(u),
+        v_(v),
+        ellipse_(ellipse),
+        radiance_(radiance),
+        area_(area_of(u, v, ellipse)) {
     const Vec3 across = cross(u, v);
     normal_ = normalize(across) * std::copysign(1.0, dot(across, facing));
     // Dual basis: p = center + a u + b v has a = (p - center)·dual_u.
@@ -57,8 +64,8 @@ class AreaLight final : public Light {
 
 }  // namespace
 
-std::unique_ptr<Light> make_area(const Vec3& center, const Vec3& u, const Vec3& v, const Vec3& facing, bool ellipse,
-                                 const Color& radiance) {
+std::unique_ptr<Light> make_area(const Vec3& center, const Vec3& u, const Vec3& v,
+                                 const Vec3& facing, bool ellipse, const Color& radiance) {
   return std::make_unique<AreaLight>(center, u, v, facing, ellipse, radiance);
 }
 

@@ -1,11 +1,12 @@
 // The world: a constant colour, or an equirectangular image.
 //
-// Image convention (Blender's): direction (x, y, z) in image space is seen at column u = ½ - atan2(y, x)/2π, row
-// v = ½ + atan2(z, √(x²+y²))/π of the unit square, row 0 at the bottom. Bilinear between texel centres, wrapped in u.
+// Image convention (Blender's): direction (x, y, z) in image space is seen at column u = ½ -
+// atan2(y, x)/2π, row v = ½ + atan2(z, √(x²+y²))/π of the unit square, row 0 at the bottom.
+// Bilinear between texel centres, wrapped in u.
 //
-// Sampling: the patches between texel centres are chosen by their mean brightness times their solid angle, then a direction
-// uniformly in solid angle within the patch. The density is thus constant per patch, without a singularity at the poles, and
-// positive wherever the bilinear image is.
+// Sampling: the patches between texel centres are chosen by their mean brightness times their solid
+// angle, then a direction uniformly in solid angle within the patch. The density is thus constant
+// per patch, without a singularity at the poles, and positive wherever the bilinear image is.
 #include "light/light.h"
 #include "light/piecewise.h"
 
@@ -29,8 +30,13 @@ class ConstantEnvironment final : public Light {
 
 class ImageEnvironment final : public Light {
  public:
-  ImageEnvironment(int width, int height, const float* image, const Mat3& image_to_world, double strength)
-      : width_(width), height_(height), image_(image), to_world_(image_to_world), strength_(strength) {
+  ImageEnvironment(int width, int height, const float* image, const Mat3& image_to_world,
+                   double strength)
+      : width_(width),
+        height_(height),
+        image_(image),
+        to_world_(image_to_world),
+        strength_(strength) {
     std::vector<double> weights;
     weights.reserve(static_cast<std::size_t>(width) * (height + 1));
     double sum = 0;
@@ -65,7 +71,8 @@ class ImageEnvironment final : public Light {
   }
 
  private:
-  // Patch (i, j) lies between the texel centres of columns i, i+1 and rows j-1, j (rows -1 and `height` repeat the pole rows).
+  // Patch (i, j) lies between the texel centres of columns i, i+1 and rows j-1, j (rows -1 and
+  // `height` repeat the pole rows).
   double sin_latitude(int j) const {
     return j <= 0 ? -1 : j > height_ ? 1 : std::sin(kPi * ((j - 0.5) / height_ - 0.5));
   }
@@ -75,7 +82,8 @@ class ImageEnvironment final : public Light {
     return {p[0], p[1], p[2]};
   }
   double density(int i, int j) const {
-    return patches_->probability(i, j) * width_ / (2 * kPi * (sin_latitude(j + 1) - sin_latitude(j)));
+    return patches_->probability(i, j) * width_ /
+           (2 * kPi * (sin_latitude(j + 1) - sin_latitude(j)));
   }
   // Radiance and sampling density towards a direction of image space.
   std::pair<Color, double> look_up(const Vec3& d) const {
@@ -84,7 +92,8 @@ class ImageEnvironment final : public Light {
     double column = u * width_ - 0.5;
     if (column < 0) column += width_;
     const double row = v * height_ + 0.5;
-    const int i = std::min(static_cast<int>(column), width_ - 1), j = std::min(static_cast<int>(row), height_);
+    const int i = std::min(static_cast<int>(column), width_ - 1),
+              j = std::min(static_cast<int>(row), height_);
     const double a = column - i, b = row - j;
     const Color low = texel(i, j - 1) * (1 - a) + texel(i + 1, j - 1) * a;
     const Color high = texel(i, j) * (1 - a) + texel(i + 1, j) * a;
@@ -104,8 +113,8 @@ std::unique_ptr<Light> make_constant_environment(const Color& radiance) {
   return std::make_unique<ConstantEnvironment>(radiance);
 }
 
-std::unique_ptr<Light> make_image_environment(int width, int height, const float* image, const Mat3& image_to_world,
-                                              double strength) {
+std::unique_ptr<Light> make_image_environment(int width, int height, const float* image,
+                                              const Mat3& image_to_world, double strength) {
   return std::make_unique<ImageEnvironment>(width, height, image, image_to_world, strength);
 }
 

@@ -49,7 +49,9 @@ class Piecewise2D {
     const int j = rows_.sample(u1);
     return {columns_[j].sample(u2), j};
   }
-  double probability(int i, int j) const { return rows_.probability(j) * columns_[j].probability(i); }
+  double probability(int i, int j) const {
+    return rows_.probability(j) * columns_[j].probability(i);
+  }
 
  private:
   Piecewise1D rows_;

@@ -1,4 +1,5 @@
-// Point, sphere and spot lights. Radiant power P: intensity P/4π, radiance of a sphere of radius r P/(4π² r²).
+// Point, sphere and spot lights. Radiant power P: intensity P/4π, radiance of a sphere of radius r
+// P/(4π² r²).
 #include "core/warp.h"
 #include "light/light.h"
 
@@ -34,7 +35,8 @@ class PointLight final : public Light {
     const Vec3 direction = to_light / distance;
     const double attenuation = cone_.attenuation(-direction);
     if (attenuation == 0) return std::nullopt;
-    return LightSample{direction, distance, power_ * (attenuation / (4 * kPi * distance2)), kInfinity};
+    return LightSample{direction, distance, power_ * (attenuation / (4 * kPi * distance2)),
+                       kInfinity};
   }
   std::optional<LightHit> intersect(const Ray&, double) const override { return std::nullopt; }
 
@@ -57,7 +59,8 @@ class SphereLight final : public Light {
     const double distance2 = dot(to_center, to_center), cap = cap_from(distance2);
     if (cap == 0) return std::nullopt;
     const double u1 = rng.uniform(), u2 = rng.uniform();
-    const Vec3 direction = Frame(to_center / std::sqrt(distance2)).to_world(square_to_cone(u1, u2, cap));
+    const Vec3 direction =
+        Frame(to_center / std::sqrt(distance2)).to_world(square_to_cone(u1, u2, cap));
     const double attenuation = cone_.attenuation(-direction);
     if (attenuation == 0) return std::nullopt;
     const double along = dot(to_center, direction);
@@ -72,14 +75,16 @@ class SphereLight final : public Light {
     const double along = dot(to_center, ray.direction);
     const Vec3 off = to_center - ray.direction * along;
     const double discriminant = radius_ * radius_ - dot(off, off);
-    if (along <= 0 || discriminant <= 0 || along - std::sqrt(discriminant) >= t_max) return std::nullopt;
+    if (along <= 0 || discriminant <= 0 || along - std::sqrt(discriminant) >= t_max)
+      return std::nullopt;
     const double attenuation = cone_.attenuation(-ray.direction);
     if (attenuation == 0) return std::nullopt;
     return LightHit{radiance_ * attenuation, 1 / (2 * kPi * cap)};
   }
 
  private:
-  // 1 - cos of the half angle under which the sphere is seen; 0 from inside, where it does not shine.
+  // 1 - cos of the half angle under which the sphere is seen; 0 from inside, where it does not
+  // shine.
   double cap_from(double distance2) const {
     const double sin2 = radius_ * radius_ / distance2;
     return sin2 < 1 ? sin2 / (1 + std::sqrt(1 - sin2)) : 0;
@@ -90,7 +95,8 @@ class SphereLight final : public Light {
   Cone cone_;
 };
 
-std::unique_ptr<Light> make(const Vec3& position, const Color& power, double radius, const Cone& cone) {
+std::unique_ptr<Light> make(const Vec3& position, const Color& power, double radius,
+                            const Cone& cone) {
   if (radius == 0) return std::make_unique<PointLight>(position, power, cone);
   return std::make_unique<SphereLight>(position, power, radius, cone);
 }
@@ -101,8 +107,8 @@ std::unique_ptr<Light> make_point(const Vec3& position, const Color& power, doub
   return make(position, power, radius, {});
 }
 
-std::unique_ptr<Light> make_spot(const Vec3& position, const Vec3& axis, const Color& power, double radius, double angle,
-                                 double blend) {
+std::unique_ptr<Light> make_spot(const Vec3& position, const Vec3& axis, const Color& power,
+                                 double radius, double angle, double blend) {
   const double cos_half = std::cos(angle / 2);
   return make(position, power, radius, {axis, cos_half, (1 - cos_half) * blend});
 }

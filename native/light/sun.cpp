@@ -1,5 +1,5 @@
-// Sun: a distant disk of constant radiance L, or one direction. The irradiance on a plane that faces a disk of half angle a is
-// E = π L sin² a.
+// Sun: a distant disk of constant radiance L, or one direction. The irradiance on a plane that
+// faces a disk of half angle a is E = π L sin² a.
 #include "core/warp.h"
 #include "light/light.h"
 
@@ -8,7 +8,8 @@ namespace {
 
 class DirectionalSun final : public Light {
  public:
-  DirectionalSun(const Vec3& axis, const Color& irradiance) : to_sun_(-axis), irradiance_(irradiance) {}
+  DirectionalSun(const Vec3& axis, const Color& irradiance)
+      : to_sun_(-axis), irradiance_(irradiance) {}
 
   double power(double r) const override { return luminance(irradiance_) * kPi * r * r; }
   std::optional<LightSample> sample(const Vec3&, Rng&) const override {
@@ -33,7 +34,8 @@ class DiskSun final : public Light {
   double power(double r) const override { return luminance(irradiance_) * kPi * r * r; }
   std::optional<LightSample> sample(const Vec3&, Rng& rng) const override {
     const double u1 = rng.uniform(), u2 = rng.uniform();
-    return LightSample{frame_.to_world(square_to_cone(u1, u2, cap_)), kInfinity, radiance_, density()};
+    return LightSample{frame_.to_world(square_to_cone(u1, u2, cap_)), kInfinity, radiance_,
+                       density()};
   }
   std::optional<LightHit> intersect(const Ray& ray, double t_max) const override {
     if (t_max < kInfinity) return std::nullopt;

@@ -1,5 +1,5 @@
-// The GGX (Trowbridge-Reitz) microfacet distribution with Smith's height-correlated masking (Walter et al. 2007, Heitz 2014).
-// α = roughness², as in Blender. Local frame, macro normal +z.
+// The GGX (Trowbridge-Reitz) microfacet distribution with Smith's height-correlated masking (Walter
+// et al. 2007, Heitz 2014). α = roughness², as in Blender. Local frame, macro normal +z.
 #pragma once
 
 #include "core/rng.h"
@@ -21,7 +21,8 @@ class Ggx {
   double masking_shadowing(const Vec3& wo, const Vec3& wi) const {
     return 1 / (1 + lambda(wo) + lambda(wi));
   }
-  // Visible normals: density masking(wo) (wo·h)₊ D(h) / wo.z (Dupuy & Benyoub 2023, spherical caps).
+  // Visible normals: density masking(wo) (wo·h)₊ D(h) / wo.z (Dupuy & Benyoub 2023, spherical
+  // caps).
   Vec3 sample_visible(const Vec3& wo, Rng& rng) const {
     const Vec3 v = normalize({alpha_ * wo.x, alpha_ * wo.y, wo.z});
     const double phi = 2 * kPi * rng.uniform();
@@ -31,7 +32,8 @@ class Ggx {
     return normalize({alpha_ * h.x, alpha_ * h.y, h.z});
   }
 
-  // Of reflected light: BRDF·cos θ_i without the Fresnel factor, and the density of reflecting about a visible normal.
+  // Of reflected light: BRDF·cos θ_i without the Fresnel factor, and the density of reflecting
+  // about a visible normal.
   double reflect_eval(const Vec3& wo, const Vec3& wi) const {
     if (wi.z <= 0) return 0;
     return distribution(normalize(wo + wi)) * masking_shadowing(wo, wi) / (4 * wo.z);
@@ -53,7 +55,9 @@ class Ggx {
   double alpha_;
 };
 
-inline Vec3 reflect(const Vec3& w, const Vec3& h) { return h * (2 * dot(w, h)) - w; }
+inline Vec3 reflect(const Vec3& w, const Vec3& h) {
+  return h * (2 * dot(w, h)) - w;
+}
 
 // Schlick's approximation of Fresnel reflectance.
 inline double schlick_weight(double cos) {

@@ -1,6 +1,6 @@
-// Micro-BRDFs: how light scatters at a point whose normal is known. Directions are unit vectors in the local frame of that
-// normal (0, 0, 1); `wo` points back along the ray and has wo.z > 0. Adding a material: one file, one line in the table of
-// scene/scene.cpp.
+// Micro-BRDFs: how light scatters at a point whose normal is known. Directions are unit vectors in
+// the local frame of that normal (0, 0, 1); `wo` points back along the ray and has wo.z > 0. Adding
+// a material: one file, one line in the table of scene/scene.cpp.
 #pragma once
 
 #include <memory>
@@ -13,8 +13,8 @@ namespace gpis {
 
 struct MaterialSample {
   Vec3 wi;
-  Color weight;     // eval / pdf
-  double pdf = 0;   // per solid angle; meaningless if specular
+  Color weight;    // eval / pdf
+  double pdf = 0;  // per solid angle; meaningless if specular
   bool specular = false;
 };
 
@@ -28,7 +28,8 @@ class Material {
   virtual std::optional<MaterialSample> sample(const Vec3& wo, Rng& rng) const = 0;
   // What the albedo pass shows.
   virtual Color albedo() const = 0;
-  // True if all light goes in one direction: eval and pdf are zero, and this much is reflected at angle of incidence θ.
+  // True if all light goes in one direction: eval and pdf are zero, and this much is reflected at
+  // angle of incidence θ.
   virtual bool specular() const { return false; }
   virtual Color specular_reflectance(double /*cos θ*/) const { return {}; }
 };
@@ -36,13 +37,16 @@ class Material {
 std::unique_ptr<Material> make_lambert(const Color& color);
 // Reflects `color` at normal incidence and `edge` at grazing angles (Schlick between).
 std::unique_ptr<Material> make_mirror(const Color& color, const Color& edge);
-// Single scattering at a GGX surface with the same reflectance `color` at all angles, as Blender's Glossy node ("GGX").
+// Single scattering at a GGX surface with the same reflectance `color` at all angles, as Blender's
+// Glossy node ("GGX").
 std::unique_ptr<Material> make_conductor(const Color& color, double roughness);
-// A subset of Blender's Principled node: metallic mixes a GGX metal (Schlick, normal reflectance = color) with a Lambertian
-// base under a dielectric GGX coat of index 1.5. No transmission, subsurface, clearcoat, sheen or multiple scattering.
+// A subset of Blender's Principled node: metallic mixes a GGX metal (Schlick, normal reflectance =
+// color) with a Lambertian base under a dielectric GGX coat of index 1.5. No transmission,
+// subsurface, clearcoat, sheen or multiple scattering.
 std::unique_ptr<Material> make_principled(const Color& color, double roughness, double metallic);
 
-// Rougher than this is a microfacet surface, smoother is a mirror: GGX α = roughness² would be below 1e-4.
+// Rougher than this is a microfacet surface, smoother is a mirror: GGX α = roughness² would be
+// below 1e-4.
 inline constexpr double kSmoothRoughness = 0.01;
 
 }  // namespace gpis

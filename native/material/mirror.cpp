@@ -1,5 +1,5 @@
-// Perfect mirror: all light goes to the reflected direction. On a stochastic surface the integrator knows the density of the
-// normals and so can light it all the same (definitions B10).
+// Perfect mirror: all light goes to the reflected direction. On a stochastic surface the integrator
+// knows the density of the normals and so can light it all the same (definitions B10).
 #include "material/ggx.h"
 #include "material/material.h"
 

@@ -1,8 +1,9 @@
 // A subset of Blender's Principled node: (1 - metallic)·(coat over Lambert) + metallic·(GGX metal).
 //
-// The coat is a GGX dielectric of index 1.5 (F0 = .04, Schlick). What it reflects is taken from the base in the reciprocal way of
-// Kelemen & Szirmay-Kalos 2001: base · (1-F(θo))(1-F(θi)) / (1-F̄), F̄ = F0 + (1-F0)/21 the cosine average of F. Over a smooth
-// coat, base + coat = 1 at every angle for a white base; rough coats lose their multiple scattering, as all GGX here.
+// The coat is a GGX dielectric of index 1.5 (F0 = .04, Schlick). What it reflects is taken from the
+// base in the reciprocal way of Kelemen & Szirmay-Kalos 2001: base · (1-F(θo))(1-F(θi)) / (1-F̄), F̄
+// = F0 + (1-F0)/21 the cosine average of F. Over a smooth coat, base + coat = 1 at every angle for
+// a white base; rough coats lose their multiple scattering, as all GGX here.
 #include "core/warp.h"
 #include "material/ggx.h"
 #include "material/material.h"
@@ -13,7 +14,9 @@ namespace {
 constexpr double kF0 = 0.04;
 constexpr double kMeanFresnel = kF0 + (1 - kF0) / 21;
 
-double coat_fresnel(double cos) { return kF0 + (1 - kF0) * schlick_weight(cos); }
+double coat_fresnel(double cos) {
+  return kF0 + (1 - kF0) * schlick_weight(cos);
+}
 
 class Principled final : public Material {
  public:
@@ -48,11 +51,13 @@ class Principled final : public Material {
   Color albedo() const override { return color_; }
 
  private:
-  // Of choosing the facets: their share of the reflected light, roughly; never 0 (they exist at every angle).
+  // Of choosing the facets: their share of the reflected light, roughly; never 0 (they exist at
+  // every angle).
   double facet_probability(const Vec3& wo) const {
     const double fresnel = coat_fresnel(wo.z);
     const double base = (1 - metallic_) * (1 - fresnel) * luminance(color_);
-    const double facets = metallic_ * std::max(luminance(color_), fresnel) + (1 - metallic_) * fresnel;
+    const double facets =
+        metallic_ * std::max(luminance(color_), fresnel) + (1 - metallic_) * fresnel;
     return facets / (facets + base);
   }
   Color color_;

@@ -1,0 +1,236 @@
+#include "integrator/path_tracer.h"
+
+#include "integrator/scatter.h"
+#include "scene/scene_impl.h"
+
+namespace gpis {
+namespace {
+
+// Ends a path that can neither escape nor fade (white walls all around): counted, never reached
+// otherwise.
+constexpr int kPathLengthLimit = 100'000;
+// Russian roulette starts here; before, nearly every path still matters.
+constexpr int kRouletteStart = 3;
+
+// What a path knows of each stochastic surface at the point it leaves; nothing: a fresh start
+// outside of it.
+using PathMemory = std::vector<std::optional<State>>;
+
+struct Vertex {
+  double t = kInfinity;
+  Vec3 position;          // of the surface
+  Vec3 departure;         // where rays start
+  Vec3 geometric_normal;  // facing the ray
+  Vec3 shading_normal;
+  const Material* material = nullptr;
+  int surface = -1;  // which stochastic surface, -1 for a mesh
+};
+
+}  // namespace
+
+struct PathTracer::Impl {
+  explicit Impl(const Scene& s)
+      : scene(s.impl()),
+        max_bounces(s.description().settings.max_bounces.value_or(kPathLengthLimit)),
+        lines(scene.stochastic.size()),
+        met(scene.stochastic.size()),
+        memory(scene.stochastic.size()),
+        shadow_memory(scene.stochastic.size()) {}
+
+  PathSample trace(const Ray& camera_ray, double t_max);
+  bool closest(const Ray& ray, double t_max, Vertex& v);
+  void remember_others(const Vertex& v);
+  bool visible(const Ray& ray, double distance);
+  template <class Scatter, class Remember>
+  Color sample_lights(const Vertex& v, const Scatter& scatter, const Remember& remember);
+  std::optional<ScatterSample> scatter_at(const Ray& ray, const Vertex& v, Color& direct,
+                                          Vec3& normal);
+
+  const Scene::Impl& scene;
+  const int max_bounces;
+  // The sample path of each stochastic surface along the current ray; `met` tells which were drawn
+  // for it.
+  std::vector<Line> lines;
+  std::vector<char> met;
+  Line shadow_line;
+  PathMemory memory, shadow_memory;
+  Rng* rng = nullptr;
+  Rng light_rng{0, 0};  // its own stream: light sampling never changes the path
+  Counters* counters = nullptr;
+};
+
+PathTracer::PathTracer(const Scene& scene) : impl_(std::make_unique<Impl>(scene)) {}
+PathTracer::~PathTracer() = default;
+
+PathSample PathTracer::trace(const Ray& camera_ray, double t_max, Rng& rng, Counters& counters) {
+  impl_->rng = &rng;
+  impl_->light_rng = Rng(rng(), 0);
+  impl_->counters = &counters;
+  return impl_->trace(camera_ray, t_max);
+}
+
+PathSample PathTracer::Impl::trace(const Ray& camera_ray, double t_max) {
+  ++counters->camera_paths;
+  PathSample result;
+  Ray ray = camera_ray;
+  Color throughput{1, 1, 1};
+  double scatter_pdf = kInfinity;
+  for (auto& state : memory) state.reset();
+
+  for (int bounce = 0;; ++bounce) {
+    Vertex v;
+    const bool hit = closest(ray, bounce == 0 ? t_max : kInfinity, v);
+
+    // Light that the ray meets on its way.
+    result.radiance += throughput * (bounce == 0 ? scene.lights.met_by_camera(ray, v.t)
+                                                 : scene.lights.met(ray, v.t, scatter_pdf));
+    if (!hit || bounce > max_bounces) break;
+    if (bounce == kPathLengthLimit) {
+      ++counters->path_length_limit;
+      break;
+    }
+    ++counters->path_vertices;
+
+    // Scatter, and light the vertex from sampled lights.
+    remember_others(v);
+    Color direct;
+    Vec3 normal;
+    const std::optional<ScatterSample> next = scatter_at(ray, v, direct, normal);
+    result.radiance += throughput * direct;
+    if (bounce == 0) {
+      result.depth = v.t;
+      result.normal = normal;
+      result.albedo = v.material->albedo();
+    }
+    if (!next) break;
+    throughput = throughput * next->weight;
+
+    // Russian roulette, only on what has been lost: a lossless path is never ended.
+    const double brightest = max_component(throughput);
+    if (!(brightest > 0)) break;
+    if (bounce >= kRouletteStart && brightest < 1) {
+      if (rng->uniform() >= brightest) break;
+      throughput *= 1 / brightest;
+    }
+    ray = {v.departure, next->direction};
+    scatter_pdf = next->pdf;
+  }
+  return result;
+}
+
+// The first surface along the ray: meshes bound the march through each process; the first of the
+// first hits wins (union of independent processes, definitions B5).
+bool PathTracer::Impl::closest(const Ray& ray, double t_max, Vertex& v) {
+  MeshHit mesh;
+  double nearest = t_max;
+  const bool hit_mesh = scene.triangles && scene.triangles->intersect(ray, t_max, mesh, *counters);
+  if (hit_mesh) nearest = mesh.t;
+  for (std::size_t i = 0; i < scene.stochastic.size(); ++i) {
+    const ProcessSurface& surface = scene.stochastic[i].surface;
+    const auto [enter, leave] = clip(surface.bounds(), ray.origin, ray.direction, 0, nearest);
+    met[i] = enter <= leave;
+    if (!met[i]) continue;
+    const Start start = surface.start_from(memory[i] ? &*memory[i] : nullptr);
+    const double t = surface.first_hit(lines[i], ray, nearest, start, *rng, *counters);
+    if (t >= nearest) continue;
+    nearest = t;
+    v.surface = static_cast<int>(i);
+  }
+  if (v.surface >= 0) {
+    v.t = nearest;
+    v.position = v.departure = ray.at(nearest);
+    v.material = scene.stochastic[v.surface].material;
+    return true;
+  }
+  if (!hit_mesh) return false;
+  const double side = dot(mesh.geometric_normal, ray.direction) < 0 ? 1 : -1;
+  v.t = mesh.t;
+  v.position = mesh.position;
+  v.geometric_normal = mesh.geometric_normal * side;
+  v.shading_normal = mesh.shading_normal * side;
+  v.departure = mesh.position + v.geometric_normal * mesh.offset;
+  v.material = scene.instance_materials[mesh.instance][mesh.material_index];
+  return true;
+}
+
+// Keeps the state of every process that was sampled at the vertex, save the one that was hit
+// (definitions B1); all else is forgotten.
+void PathTracer::Impl::remember_others(const Vertex& v) {
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    memory[i].reset();
+    const ProcessSurface& surface = scene.stochastic[i].surface;
+    if (!met[i] || static_cast<int>(i) == v.surface || surface.memory() == Memory::none) continue;
+    if (!surface.sampled_at(lines[i], v.t)) continue;
+    const double value = surface.value(lines[i], v.t);
+    if (!(value > 0)) {
+      ++counters->states_inside;
+      continue;
+    }
+    const Vec3 gradient = surface.memory() == Memory::renewal_plus
+                              ? surface.gradient_law(lines[i], v.t).draw(*rng)
+                              : Vec3{};
+    memory[i] = surface.state(value, gradient);
+  }
+}
+
+// Visibility is 0 or 1, a fresh sample of every process under shadow_memory.
+bool PathTracer::Impl::visible(const Ray& ray, double distance) {
+  ++counters->shadow_rays;
+  if (scene.triangles && scene.triangles->occluded(ray, distance, *counters)) return false;
+  for (std::size_t i = 0; i < scene.stochastic.size(); ++i) {
+    const ProcessSurface& surface = scene.stochastic[i].surface;
+    const auto [enter, leave] = clip(surface.bounds(), ray.origin, ray.direction, 0, distance);
+    if (enter > leave) continue;
+    const Start start = surface.start_from(shadow_memory[i] ? &*shadow_memory[i] : nullptr);
+    if (surface.first_hit(shadow_line, ray, distance, start, light_rng, *counters) < distance)
+      return false;
+  }
+  return true;
+}
+
+// Next-event estimation. `remember(direction, memory)` puts the state of the surface that was hit
+// into the copy of the memory that the shadow ray starts with.
+template <class Scatter, class Remember>
+Color PathTracer::Impl::sample_lights(const Vertex& v, const Scatter& scatter,
+                                      const Remember& remember) {
+  if (!scene.lights.sampled()) return {};
+  const std::optional<LightSample> light = scene.lights.sample(v.departure, light_rng);
+  if (!light) return {};
+  const Color f = scatter.eval(light->direction);
+  if (!(max_component(f) > 0)) return {};
+  shadow_memory = memory;
+  remember(light->direction, shadow_memory);
+  if (!visible({v.departure, light->direction}, light->distance)) return {};
+  if (light->delta()) return f * light->radiance;
+  return f * light->radiance * (balance(light->pdf, scatter.pdf(light->direction)) / light->pdf);
+}
+
+// Light from sampled lights, and the direction in which the path goes on (nothing: absorbed). On a
+// stochastic surface this draws its gradient and remembers it.
+std::optional<ScatterSample> PathTracer::Impl::scatter_at(const Ray& ray, const Vertex& v,
+                                                          Color& direct, Vec3& normal) {
+  if (v.surface < 0) {
+    const SurfaceScatter scatter(*v.material, ray.direction, v.geometric_normal, v.shading_normal);
+    normal = v.shading_normal;
+    if (!scatter.specular()) direct = sample_lights(v, scatter, [](const Vec3&, PathMemory&) {});
+    return scatter.sample(*rng);
+  }
+
+  const ProcessSurface& surface = scene.stochastic[v.surface].surface;
+  const GradientLaw law = surface.gradient_law(lines[v.surface], v.t);
+  const Vec3 gradient = law.draw(*rng);
+  memory[v.surface] = surface.state(0, gradient);
+  normal = normalize(gradient);
+  if (v.material->specular() && !law.degenerate) {
+    const MirrorScatter scatter(*v.material, ray.direction, law);
+    direct = sample_lights(v, scatter, [&](const Vec3& w, PathMemory& m) {
+      m[v.surface] = surface.state(0, *scatter.gradient_for(w));
+    });
+    return scatter.sample(gradient);
+  }
+  const SurfaceScatter scatter(*v.material, ray.direction, normal, normal);
+  if (!scatter.specular()) direct = sample_lights(v, scatter, [](const Vec3&, PathMemory&) {});
+  return scatter.sample(*rng);
+}
+
+}  // namespace gpis

@@ -1,0 +1,167 @@
+#include "scene/check.h"
+
+#include <sstream>
+#include <stdexcept>
+
+namespace gpis {
+namespace {
+
+template <class... Parts>
+[[noreturn]] void fail(const Parts&... parts) {
+  std::ostringstream sentence;
+  (sentence << ... << parts);
+  throw std::invalid_argument(sentence.str());
+}
+
+std::string text(const Color& c) {
+  std::ostringstream s;
+  s << "(" << c.x << ", " << c.y << ", " << c.z << ")";
+  return s.str();
+}
+
+void check_at_least(double value, double low, const std::string& path) {
+  if (!(value >= low) || !std::isfinite(value))
+    fail(path, " is ", value, "; give a finite number of at least ", low, ".");
+}
+
+void check_between(double value, double low, double high, const std::string& path) {
+  if (!(value >= low && value <= high))
+    fail(path, " is ", value, "; give a number from ", low, " to ", high, ".");
+}
+
+void check_color(const Color& c, double high, const std::string& path) {
+  for (int k = 0; k < 3; ++k)
+    if (!(c[k] >= 0 && c[k] <= high) || !std::isfinite(c[k]))
+      fail(
+          path, " is ", text(c), "; each entry must be finite, not negative",
+          high < kInfinity ? " and at most 1 (a surface reflects no more than it receives)." : ".");
+}
+
+void check_transform(const Affine& m, const std::string& path) {
+  double size = 1;
+  for (const Vec3& row : m.linear.row) {
+    if (!is_finite(row)) fail(path, " holds numbers that are not finite.");
+    size *= length(row);
+  }
+  if (!is_finite(m.translation)) fail(path, " holds numbers that are not finite.");
+  if (!(std::abs(determinant(m.linear)) > 1e-12 * size))
+    fail(path, " flattens space (its determinant is ", determinant(m.linear),
+         "): the object has no size along some axis. Give it a scale other than zero.");
+}
+
+void check_settings(const SettingsDescription& s) {
+  if (s.max_bounces && *s.max_bounces < 0)
+    fail("settings.max_bounces is ", *s.max_bounces, "; give 0 or more, or None for no limit.");
+  if (!(s.missed_root > 0 && s.missed_root < 1))
+    fail("settings.missed_root is ", s.missed_root,
+         "; give a probability between 0 and 1, such as 1e-3.");
+  check_at_least(s.clamp, 0, "settings.clamp");
+}
+
+void check_world(const WorldDescription& w) {
+  check_color(w.color, kInfinity, "world.color");
+  check_at_least(w.strength, 0, "world.strength");
+  if (w.image.empty()) return;
+  if (w.image_width < 1 || w.image_height < 1 ||
+      w.image.size() != 3ull * w.image_width * w.image_height)
+    fail("world.image holds ", w.image.size(), " numbers, but its size is ", w.image_width, " x ",
+         w.image_height, " x 3.");
+  for (std::size_t i = 0; i < w.image.size(); ++i)
+    if (!std::isfinite(w.image[i]))
+      fail("world.image holds ", w.image[i], " at row ", i / 3 / w.image_width, ", column ",
+           i / 3 % w.image_width, "; all its numbers must be finite.");
+  const Mat3 square = w.matrix * transpose(w.matrix);
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      if (!(std::abs(square.row[i][j] - (i == j)) < 1e-4))
+        fail(
+            "world.matrix is not a rotation (M Mᵀ differs from the identity); give one without "
+            "scale or shear.");
+}
+
+void check_light(const LightDescription& l, const EntryPath& path) {
+  check_transform(l.matrix, path + ".matrix");
+  check_color(l.color, kInfinity, path + ".color");
+  check_at_least(l.power, 0, path + ".power");
+  if (l.radiance) check_color(*l.radiance, kInfinity, path + ".radiance");
+  check_at_least(l.radius, 0, path + ".radius");
+  check_between(l.blend, 0, 1, path + ".blend");
+  if (l.type == LightDescription::Type::area && !(l.size_x > 0 && l.size_y > 0))
+    fail(path + ".size", " is (", l.size_x, ", ", l.size_y,
+         "); an area light needs a positive size.");
+  if (l.type == LightDescription::Type::sun) check_between(l.angle, 0, kPi, path + ".angle");
+  if (l.type == LightDescription::Type::spot && !(l.angle > 0 && l.angle <= kPi))
+    fail(path + ".angle", " is ", l.angle,
+         "; a spot needs a cone of more than 0 and at most π radians.");
+}
+
+void check_material(const MaterialDescription& m, const EntryPath& path) {
+  check_color(m.color, 1, path + ".color");
+  check_between(m.roughness, 0, 1, path + ".roughness");
+  check_between(m.metallic, 0, 1, path + ".metallic");
+}
+
+void check_mesh(const MeshDescription& m, const EntryPath& path) {
+  if (m.vertices.size() % 3)
+    fail(path + ".vertices", " holds ", m.vertices.size(), " numbers; give (N, 3).");
+  if (m.triangles.size() % 3)
+    fail(path + ".triangles", " holds ", m.triangles.size(), " indices; give (M, 3).");
+  const std::size_t vertices = m.vertices.size() / 3, triangles = m.triangles.size() / 3;
+  for (std::size_t i = 0; i < m.vertices.size(); ++i)
+    if (!std::isfinite(m.vertices[i]))
+      fail(path + (".vertices[" + std::to_string(i / 3) + "]"), " holds ", m.vertices[i],
+           "; coordinates must be finite.");
+  for (std::size_t i = 0; i < m.triangles.size(); ++i)
+    if (m.triangles[i] >= vertices)
+      fail(path + (".triangles[" + std::to_string(i / 3) + "]"), " names vertex ", m.triangles[i],
+           ", but there are only ", vertices, ".");
+  const std::size_t normals = 3 * (m.normals_per_corner ? 3 * triangles : vertices);
+  if (!m.normals.empty() && m.normals.size() != normals)
+    fail(path + ".normals", " holds ", m.normals.size(), " numbers; ",
+         m.normals_per_corner ? "three per corner" : "three per vertex", " are ", normals, ".");
+  for (std::size_t i = 0; i < m.normals.size(); ++i)
+    if (!std::isfinite(m.normals[i]))
+      fail(path + (".normals[" + std::to_string(i / 3) + "]"), " holds ", m.normals[i],
+           "; normals must be finite.");
+  if (!m.material_index.empty() && m.material_index.size() != triangles)
+    fail(path + ".material_index", " has ", m.material_index.size(), " entries for ", triangles,
+         " triangles.");
+}
+
+void check_object(const SceneDescription& d, const ObjectDescription& o, const EntryPath& path) {
+  check_transform(o.matrix, path + ".matrix");
+  for (const int m : o.materials)
+    if (m < 0 || m >= static_cast<int>(d.materials.size()))
+      fail(path + ".materials", " names a material that is not in `materials`.");
+  if (o.type == ObjectDescription::Type::gpis) {
+    if (!o.process) fail(path + ".process", " is missing; a gpis object needs one.");
+    if (o.materials.size() != 1)
+      fail(path + ".materials", " has ", o.materials.size(), " entries; a gpis object takes one.");
+    return;
+  }
+  if (o.mesh < 0 || o.mesh >= static_cast<int>(d.meshes.size()))
+    fail(path + ".mesh", " names a mesh that is not in `meshes`.");
+  if (o.materials.empty()) fail(path + ".materials", " is empty; name at least one material.");
+  const auto& index = d.meshes[o.mesh].material_index;
+  for (std::size_t i = 0; i < index.size(); ++i)
+    if (index[i] < 0 || index[i] >= static_cast<int>(o.materials.size()))
+      fail(path + ".materials", " has ", o.materials.size(), " entries, but material_index[", i,
+           "] of its mesh is ", index[i], ".");
+}
+
+}  // namespace
+
+void check(const SceneDescription& d) {
+  check_settings(d.settings);
+  check_world(d.world);
+  for (std::size_t i = 0; i < d.lights.size(); ++i)
+    check_light(d.lights[i], EntryPath("lights", i, d.lights[i].name));
+  for (std::size_t i = 0; i < d.materials.size(); ++i)
+    check_material(d.materials[i], EntryPath("materials", i, d.materials[i].name));
+  for (std::size_t i = 0; i < d.meshes.size(); ++i)
+    check_mesh(d.meshes[i], EntryPath("meshes", i, d.meshes[i].name));
+  for (std::size_t i = 0; i < d.objects.size(); ++i)
+    check_object(d, d.objects[i], EntryPath("objects", i, d.objects[i].name));
+}
+
+}  // namespace gpis

@@ -1,0 +1,163 @@
+#include "scene/scene.h"
+
+#include <stdexcept>
+
+#include "scene/check.h"
+#include "scene/scene_impl.h"
+
+namespace gpis {
+namespace {
+
+std::unique_ptr<Material> make_material(const MaterialDescription& m) {
+  using Type = MaterialDescription::Type;
+  switch (m.type) {
+    case Type::lambert:
+      return make_lambert(m.color);
+    case Type::mirror:
+      return make_mirror(m.color, m.color);
+    case Type::conductor:
+      return make_conductor(m.color, m.roughness);
+    case Type::principled:
+      return make_principled(m.color, m.roughness, m.metallic);
+  }
+  throw std::invalid_argument("materials: unknown type.");
+}
+
+std::unique_ptr<Light> make_light(const LightDescription& l) {
+  using Type = LightDescription::Type;
+  const Vec3 position = l.matrix.translation, axis = normalize(l.matrix.vector({0, 0, -1}));
+  const Color power = l.color * l.power;
+  switch (l.type) {
+    case Type::point:
+      return make_point(position, power, l.radius);
+    case Type::spot:
+      return make_spot(position, axis, power, l.radius, l.angle, l.blend);
+    case Type::sun:
+      return make_sun(axis, power, l.angle);
+    case Type::area: {
+      const Vec3 u = l.matrix.vector({l.size_x, 0, 0}), v = l.matrix.vector({0, l.size_y, 0});
+      const Color radiance = l.radiance ? *l.radiance : power / (kPi * area_of(u, v, l.ellipse));
+      return make_area(position, u, v, axis, l.ellipse, radiance);
+    }
+  }
+  throw std::invalid_argument("lights: unknown type.");
+}
+
+std::unique_ptr<Light> make_world(const WorldDescription& w) {
+  if (w.image.empty()) return make_constant_environment(w.color * w.strength);
+  return make_image_environment(w.image_width, w.image_height, w.image.data(), w.matrix,
+                                w.strength);
+}
+
+bool is_black(const WorldDescription& w) {
+  return w.strength == 0 || (w.image.empty() && max_component(w.color) == 0);
+}
+
+// Of the sphere about all finite bounds; 1 if there are none.
+double bounding_radius(const Scene::Impl& scene) {
+  Box3 all;
+  const auto include = [&](const Box3& b) {
+    if (b.empty() || !is_finite(b.min) || !is_finite(b.max)) return;
+    all.include(b.min);
+    all.include(b.max);
+  };
+  if (scene.triangles) include(scene.triangles->bounds());
+  for (const auto& s : scene.stochastic) include(s.surface.bounds());
+  const double radius = all.empty() ? 0 : length(all.max - all.min) / 2;
+  return radius > 0 ? radius : 1;
+}
+
+}  // namespace
+
+Scene::Scene(SceneDescription description)
+    : description_(std::move(description)), impl_(std::make_unique<Impl>()) {
+  const SceneDescription& d = description_;
+  check(d);
+  for (const MaterialDescription& m : d.materials) impl_->materials.push_back(make_material(m));
+  build_objects();
+  if (impl_->triangles) impl_->triangles->commit();
+  impl_->radius = bounding_radius(*impl_);
+  for (const LightDescription& l : d.lights) impl_->lights.add(make_light(l), l.visible_to_camera);
+  if (!is_black(d.world)) impl_->lights.add(make_world(d.world), true);
+  impl_->lights.finish(impl_->radius, d.settings.light_sampling);
+}
+
+Scene::~Scene() = default;
+
+void Scene::build_objects() {
+  const SceneDescription& d = description_;
+  std::vector<int> mesh_of(d.meshes.size(), -1);  // meshes that no object uses are left out
+  int meshes = 0;
+  for (std::size_t i = 0; i < d.objects.size(); ++i) {
+    const ObjectDescription& o = d.objects[i];
+    if (o.type == ObjectDescription::Type::gpis) {
+      try {
+        impl_->stochastic.push_back(
+            {static_cast<int>(i),
+             ProcessSurface(o.process, o.matrix, o.memory, o.sampler, d.settings.missed_root),
+             impl_->materials[o.materials[0]].get()});
+      } catch (const std::invalid_argument& error) {
+        throw std::invalid_argument(EntryPath("objects", i, o.name) + ".process" + ": " +
+                                    error.what());
+      }
+      continue;
+    }
+    const MeshDescription& mesh = d.meshes[o.mesh];
+    if (mesh.triangles.empty()) continue;
+    if (!impl_->triangles) impl_->triangles = std::make_unique<TriangleScene>();
+    if (mesh_of[o.mesh] < 0) {
+      impl_->triangles->add_mesh({mesh.vertices, mesh.triangles, mesh.normals,
+                                  mesh.normals_per_corner, mesh.material_index});
+      mesh_of[o.mesh] = meshes++;
+    }
+    impl_->triangles->add_instance(mesh_of[o.mesh], o.matrix);
+    std::vector<const Material*>& slots = impl_->instance_materials.emplace_back();
+    for (const int m : o.materials) slots.push_back(impl_->materials[m].get());
+  }
+}
+
+std::vector<std::pair<std::string, std::string>> Scene::plan() const {
+  const SceneDescription& d = description_;
+  std::vector<std::pair<std::string, std::string>> rows;
+  rows.emplace_back("scene.embree",
+                    impl_->triangles
+                        ? std::to_string(impl_->instance_materials.size()) + " mesh objects"
+                        : "left out: no meshes");
+  rows.emplace_back(
+      "scene.light_sampling",
+      impl_->lights.sampled()
+          ? "on: a shadow ray at every surface that is not a deterministic mirror"
+      : d.settings.light_sampling
+          ? "left out: nothing to sample (a constant world is met by following the BRDF)"
+          : "off by settings.light_sampling");
+  rows.emplace_back("scene.world", is_black(d.world)       ? "left out: black"
+                                   : d.world.image.empty() ? "constant colour"
+                                                           : "image, sampled by brightness");
+  rows.emplace_back("scene.bounces", d.settings.max_bounces
+                                         ? "at most " + std::to_string(*d.settings.max_bounces)
+                                         : "unlimited, Russian roulette below throughput 1");
+  for (std::size_t i = 0; i < d.lights.size(); ++i)
+    rows.emplace_back("lights[" + std::to_string(i) + "].probability",
+                      std::to_string(impl_->lights.probability(i)));
+  for (std::size_t i = 0; i < d.materials.size(); ++i) {
+    const MaterialDescription& m = d.materials[i];
+    const bool smooth = m.roughness < kSmoothRoughness;
+    std::string row;
+    if (m.type == MaterialDescription::Type::conductor)
+      row = smooth ? "mirror: roughness below .01" : "single-scatter GGX, alpha = roughness²";
+    if (m.type == MaterialDescription::Type::principled)
+      row = smooth && m.metallic == 1 ? "mirror (Schlick): metallic 1, roughness below .01"
+                                      : std::string(
+                                            "Lambert under a dielectric coat (index 1.5) mixed "
+                                            "with a metal, single-scatter GGX") +
+                                            (smooth ? ", roughness raised to .01" : "");
+    if (!row.empty()) rows.emplace_back("materials[" + std::to_string(i) + "].model", row);
+  }
+  for (const auto& s : impl_->stochastic)
+    for (const auto& [key, value] : s.surface.plan())
+      rows.emplace_back(EntryPath("objects", s.object, d.objects[s.object].name) + ("." + key),
+                        value);
+  return rows;
+}
+
+}  // namespace gpis
