@@ -13,7 +13,6 @@ class Piecewise1D {
   Piecewise1D() = default;
   explicit Piecewise1D(const std::vector<double>& weights) {
     cumulative_.reserve(weights.size() + 1);
-    cumulative_.push_back(0);
     for (const double w : weights) cumulative_.push_back(cumulative_.back() + w);
   }
   double sum() const { return cumulative_.back(); }

@@ -1,0 +1,88 @@
+// Small scenes for the transport tests.
+#pragma once
+
+#include "core/rng.h"
+#include "scene/scene.h"
+
+namespace gpis::test {
+
+inline MaterialDescription material(MaterialDescription::Type type, double color,
+                                    double roughness = 0) {
+  MaterialDescription m;
+  m.type = type;
+  m.color = {color, color, color};
+  m.roughness = roughness;
+  return m;
+}
+inline MaterialDescription lambert(double color) {
+  return material(MaterialDescription::Type::lambert, color);
+}
+
+inline Affine placed(const Vec3& at, double scale = 1, const Vec3& turned = {0, 0, 1}) {
+  const Frame f(normalize(turned));
+  return {transpose(Mat3{{f.s * scale, f.t * scale, f.n * scale}}), at};
+}
+
+// [-1, 1]² at z = 0, as `n`² squares.
+inline MeshDescription plane_mesh(int n = 1) {
+  MeshDescription m;
+  for (int j = 0; j <= n; ++j)
+    for (int i = 0; i <= n; ++i)
+      for (const double c : {-1 + 2.0 * i / n, -1 + 2.0 * j / n, 0.0})
+        m.vertices.push_back(static_cast<float>(c));
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < n; ++i) {
+      const auto a = static_cast<std::uint32_t>(j * (n + 1) + i), b = a + 1, c = a + n + 1,
+                 d = c + 1;
+      for (const auto v : {a, b, d, a, d, c}) m.triangles.push_back(v);
+    }
+  return m;
+}
+
+// Unit sphere; `smooth` gives vertex normals.
+inline MeshDescription sphere_mesh(int rows, bool smooth) {
+  MeshDescription m;
+  const int columns = 2 * rows;
+  for (int j = 0; j <= rows; ++j)
+    for (int i = 0; i < columns; ++i) {
+      const double theta = kPi * j / rows, phi = 2 * kPi * i / columns;
+      for (const double c :
+           {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)})
+        m.vertices.push_back(static_cast<float>(c));
+    }
+  for (int j = 0; j < rows; ++j)
+    for (int i = 0; i < columns; ++i) {
+      const auto a = static_cast<std::uint32_t>(j * columns + i),
+                 b = static_cast<std::uint32_t>(j * columns + (i + 1) % columns);
+      for (const std::uint32_t v : {a, a + columns, b + columns, a, b + columns, b})
+        m.triangles.push_back(v);
+    }
+  if (smooth) m.normals = m.vertices;
+  return m;
+}
+
+inline MeshDescription cube_mesh() {
+  MeshDescription m;
+  for (int k = 0; k < 8; ++k)
+    for (int axis = 0; axis < 3; ++axis) m.vertices.push_back(k >> axis & 1 ? 1.f : -1.f);
+  m.triangles = {0, 1, 3, 0, 3, 2, 4, 6, 7, 4, 7, 5, 0, 4, 5, 0, 5, 1,
+                 2, 3, 7, 2, 7, 6, 0, 2, 6, 0, 6, 4, 1, 5, 7, 1, 7, 3};
+  return m;
+}
+
+inline void add_mesh_object(SceneDescription& scene, int mesh, int material,
+                            const Affine& matrix = {}) {
+  ObjectDescription o;
+  o.mesh = mesh;
+  o.materials = {material};
+  o.matrix = matrix;
+  scene.objects.push_back(o);
+}
+
+inline void set_world_image(SceneDescription& scene, int width, int height, double value) {
+  scene.world.image_width = width;
+  scene.world.image_height = height;
+  scene.world.image.assign(3ull * width * height, static_cast<float>(value));
+}
+
+}  // namespace gpis::test

@@ -1,0 +1,228 @@
+// Path tracing over meshes against closed forms.
+#include "check.h"
+#include "integrator/path_tracer.h"
+#include "scenes.h"
+
+using namespace gpis;
+using namespace gpis::test;
+
+namespace {
+
+struct Render {
+  Mean radiance;
+  Counters counters;
+};
+
+// Red of many paths along rays made by `ray(rng)`.
+template <class MakeRay>
+Render trace(const SceneDescription& description, const MakeRay& ray, int paths,
+             std::uint64_t seed = 1) {
+  const Scene scene(description);
+  PathTracer tracer(scene);
+  Render result;
+  for (int i = 0; i < paths; ++i) {
+    Rng rng(seed, i);
+    const Ray r = ray(rng);
+    result.radiance.add(tracer.trace(r, kInfinity, rng, result.counters).radiance.x);
+  }
+  return result;
+}
+
+Vec3 any_direction(Rng& rng) {
+  for (;;) {
+    const Vec3 v{rng.normal(), rng.normal(), rng.normal()};
+    if (length(v) > 1e-3) return normalize(v);
+  }
+}
+
+LightDescription light(LightDescription::Type type, const Vec3& at) {
+  LightDescription l;
+  l.type = type;
+  l.matrix = placed(at);
+  l.power = 100;
+  return l;
+}
+
+SceneDescription bowl_and_spheres(bool smooth) {
+  SceneDescription s;
+  s.world.color = {1, 1, 1};
+  s.materials = {lambert(1), material(MaterialDescription::Type::mirror, 1)};
+  s.meshes = {plane_mesh(), sphere_mesh(8, smooth)};
+  add_mesh_object(s, 0, 0, placed({0, 0, -1}, 3));
+  add_mesh_object(s, 0, 0, placed({3, 0, 0}, 3, {1, 0, 0.1}));
+  add_mesh_object(s, 1, 0, placed({0, 0, 0}));
+  add_mesh_object(s, 1, 1, placed({1.5, 1, 0.2}, 0.7));
+  return s;
+}
+
+}  // namespace
+
+TEST(mesh_furnace_is_exactly_one) {
+  for (const bool smooth : {false, true})
+    for (const bool image : {false, true}) {
+      context() = std::string(smooth ? "smooth" : "flat") + (image ? ", light sampling" : "");
+      SceneDescription s = bowl_and_spheres(smooth);
+      if (image) set_world_image(s, 8, 4, 1);
+      const Render r = trace(
+          s,
+          [](Rng& rng) {
+            return Ray{{-4, -3, 3}, normalize(Vec3{4, 3, -3.5} + any_direction(rng) * 2)};
+          },
+          20'000);
+      CHECK(std::abs(r.radiance.z(1)), <, 4.0);
+      if (!image) CHECK(std::abs(r.radiance.mean() - 1) + r.radiance.error(), <, 1e-7);
+      CHECK(r.counters.path_length_limit, ==, 0u);
+      CHECK(r.counters.path_vertices, >, r.counters.camera_paths);
+      CHECK((r.counters.shadow_rays > 0), ==, image);
+    }
+}
+
+TEST(closed_boxes_do_not_leak) {
+  // World 1 outside of a dark grey closed body: no ray may get out, wherever the body is and
+  // however it is placed.
+  for (const double scale : {1e-3, 1.0, 1e3})
+    for (const double far : {0.0, 10.0, 100.0})
+      for (const bool instanced : {false, true}) {
+        context() = "scale " + std::to_string(scale) + ", at " + std::to_string(far) + " sizes" +
+                    (instanced ? ", instanced" : "");
+        const Vec3 at = Vec3{0.3, -1, 0.7} * (far * scale);
+        SceneDescription s;
+        s.world.color = {1, 1, 1};
+        s.materials = {lambert(0.9)};
+        s.meshes = {cube_mesh(), sphere_mesh(16, true)};
+        for (const int mesh : {0, 1}) {
+          s.objects.clear();
+          add_mesh_object(s, mesh, 0, placed(at, scale, {1, 2, 3}));
+          if (instanced) add_mesh_object(s, mesh, 0, placed(at + Vec3{9, 9, 9} * scale, scale));
+          const Render r = trace(
+              s,
+              [&](Rng& rng) {
+                return Ray{at, any_direction(rng)};
+              },
+              3000);
+          CHECK(r.radiance.sum, ==, 0.0);
+          CHECK(r.counters.path_vertices, >, 9 * r.counters.camera_paths);
+        }
+      }
+}
+
+TEST(lights_light_a_plane_as_in_closed_form) {
+  using Type = LightDescription::Type;
+  struct Row {
+    const char* name;
+    LightDescription light;
+    double irradiance;
+  };
+  std::vector<Row> rows;
+  const double at_two = 100 / (4 * kPi * 4);
+  rows.push_back({"point", light(Type::point, {0, 0, 2}), at_two});
+  rows.push_back({"sphere", light(Type::point, {0, 0, 2}), at_two});
+  rows.back().light.radius = 0.7;
+  rows.push_back({"sun", light(Type::sun, {}), 100});
+  rows.push_back({"sun disk", light(Type::sun, {}), 100});
+  rows.back().light.angle = 1;
+  rows.push_back({"disk", light(Type::area, {0, 0, 2}), 100 / (kPi * kPi / 4) * kPi * 0.25 / 4.25});
+  rows.back().light.ellipse = true;
+  rows.push_back({"spot", light(Type::spot, {0, 0, 2}), at_two});
+  rows.back().light.angle = 1;
+  for (const Row& row : rows)
+    for (const bool sampling : {true, false}) {
+      const bool delta =
+          row.light.radius == 0 && row.light.angle == 0 && row.light.type != Type::area;
+      if (!sampling && (delta || row.light.type == Type::spot)) continue;
+      context() = std::string(row.name) + (sampling ? "" : ", by BRDF sampling alone");
+      SceneDescription s;
+      s.materials = {lambert(0.5)};
+      s.meshes = {plane_mesh()};
+      add_mesh_object(s, 0, 0);
+      s.lights = {row.light};
+      s.settings.light_sampling = sampling;
+      const Render r = trace(
+          s,
+          [](Rng&) {
+            return Ray{{0.5, 0, 0.5}, normalize({-1, 0, -1})};
+          },
+          100'000);
+      const double expected = 0.5 * row.irradiance / kPi;
+      // The point that is lit stands off the plane by the self-intersection offset.
+      CHECK(std::abs(r.radiance.mean() - expected), <, 4 * r.radiance.error() + 5e-5 * expected);
+      CHECK(r.radiance.error(), <, 0.02 * r.radiance.mean());
+    }
+}
+
+TEST(integrating_sphere_reaches_its_closed_form) {
+  // Inside a closed sphere of reflectance p a lamp in the middle gives the exitance E0 p / (1 - p),
+  // E0 = power/(4 pi r²).
+  for (const double albedo : {0.5, 0.9}) {
+    context() = "albedo " + std::to_string(albedo);
+    SceneDescription s;
+    s.materials = {lambert(albedo)};
+    s.meshes = {sphere_mesh(48, false)};
+    add_mesh_object(s, 0, 0, placed({}, 2));
+    s.lights = {light(LightDescription::Type::point, {})};
+    const Render r = trace(
+        s,
+        [](Rng& rng) {
+          return Ray{{0.1, 0, 0}, any_direction(rng)};
+        },
+        20'000);
+    const double expected = 100 / (4 * kPi * 4) * albedo / (1 - albedo) / kPi;
+    // The facets are nearer than the sphere: up to 0.3% more.
+    CHECK(std::abs(r.radiance.mean() / expected - 1), <, 0.005 + 4 * r.radiance.error() / expected);
+    CHECK(r.counters.path_length_limit, ==, 0u);
+  }
+}
+
+TEST(light_sampling_changes_nothing_in_expectation) {
+  // A glossy and a matt sphere on a plane under an uneven sky, a lamp and a wide sun.
+  SceneDescription s = bowl_and_spheres(true);
+  s.materials = {lambert(0.6), material(MaterialDescription::Type::conductor, 0.9, 0.5)};
+  set_world_image(s, 8, 4, 0.2);
+  for (int k = 0; k < 3; ++k) s.world.image[3 * (8 * 3 + 2) + k] = 20;
+  s.lights = {light(LightDescription::Type::point, {-1, -1, 3}),
+              light(LightDescription::Type::sun, {})};
+  s.lights[0].radius = 0.8;
+  s.lights[1].angle = 1.5;
+  s.lights[1].power = 2;
+  s.lights[1].matrix = placed({}, 1, {-1, -2, 2});
+  const auto ray = [](Rng& rng) {
+    return Ray{{-4, -3, 3}, normalize(Vec3{4, 3, -3.5} + any_direction(rng) * 1.5)};
+  };
+  const Render on = trace(s, ray, 100'000, 1);
+  s.settings.light_sampling = false;
+  const Render off = trace(s, ray, 300'000, 2);
+  CHECK(std::abs(on.radiance.z(off.radiance)), <, 4.0);
+  CHECK(on.radiance.error(), <, 0.02 * on.radiance.mean());
+  CHECK(off.counters.shadow_rays, ==, 0u);
+}
+
+TEST(bounces_are_counted_from_direct_light) {
+  // Two facing white planes under a sun: no bounce shows direct light only.
+  SceneDescription s;
+  s.materials = {lambert(0.5)};
+  s.meshes = {plane_mesh()};
+  add_mesh_object(s, 0, 0);
+  s.lights = {light(LightDescription::Type::sun, {})};
+  s.settings.max_bounces = 0;
+  const auto ray = [](Rng&) { return Ray{{0, 0, 1}, {0, 0, -1}}; };
+  const Render direct = trace(s, ray, 100);
+  CHECK(std::abs(direct.radiance.mean() - 50 / kPi), <, 1e-9);
+  CHECK(direct.counters.path_vertices, ==, 100u);
+}
+
+TEST(first_hit_features_are_those_of_the_surface) {
+  SceneDescription s;
+  s.materials = {lambert(0.5)};
+  s.meshes = {plane_mesh()};
+  add_mesh_object(s, 0, 0, placed({0, 0, 1}));
+  const Scene scene(s);
+  PathTracer tracer(scene);
+  Counters counters;
+  Rng rng(1, 0);
+  const PathSample hit = tracer.trace({{0, 0, 3}, {0, 0, -1}}, kInfinity, rng, counters);
+  CHECK(std::abs(hit.depth - 2), <, 1e-6);
+  CHECK(hit.normal.z, ==, 1.0);
+  CHECK(hit.albedo.x, ==, 0.5);
+  CHECK(tracer.trace({{0, 0, 3}, {0, 0, -1}}, 1.5, rng, counters).depth, ==,
+        kInfinity);  // beyond the camera's far end
+}
