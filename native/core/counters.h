@@ -1,29 +1,31 @@
-// What the renderer did, counted where it is done: one set per thread, added up at the end, reported in `stats`.
-// Tests assert on these, never on times. X(name, meaning): adding a counter is one line here.
+// What the renderer did, counted where it is done: one set per thread, added up at the end,
+// reported in `stats`. Tests assert on these, never on times. X(name, meaning): adding a counter is
+// one line here.
 #pragma once
 
 #include <cstdint>
 
-#define GPIS_COUNTERS(X)                                                                   \
-  X(camera_paths, "camera paths traced")                                                   \
-  X(path_vertices, "surface interactions")                                                 \
-  X(path_length_limit, "paths ended by the safety limit on their length")                  \
-  X(states_inside, "processes found inside where another surface was hit (a missed root): forgotten there")        \
-  X(shadow_rays, "visibility rays towards lights")                                         \
-  X(mesh_rays, "rays handed to Embree")                                                    \
-  X(line_segments, "rays that met an uncertain region of a process")                       \
-  X(line_skipped, "rays certain to miss a process: nothing drawn")                         \
-  X(line_evaluations, "evaluations of a process on a line")                                \
-  X(line_normals, "normal random numbers drawn for lines and gradients")                   \
-  X(line_splits, "steps divided because a root could hide in them")                        \
-  X(line_step_limit, "lines ended by the bound on steps per ray")                          \
-  X(line_entry_inside, "lines found inside on re-entry after a skip")                      \
-  X(line_slope_floor, "starts or hits whose slope had the wrong sign by rounding")         \
-  X(line_split_limit, "steps no longer divided: narrower than the tolerance")              \
-  X(factorisations, "covariance matrices factorised")                                      \
-  X(field_lookups, "evaluations of mean or deviation fields")                              \
-  X(truncated_normals, "starts drawn conditioned on being outside")                        \
-  X(nan_samples, "samples that were not finite: counted, logged and left out of the film") \
+#define GPIS_COUNTERS(X)                                                                     \
+  X(camera_paths, "camera paths traced")                                                     \
+  X(path_vertices, "surface interactions")                                                   \
+  X(path_length_limit, "paths ended by the safety limit on their length")                    \
+  X(states_inside,                                                                           \
+    "processes found inside where another surface was hit (a missed root): forgotten there") \
+  X(shadow_rays, "visibility rays towards lights")                                           \
+  X(mesh_rays, "rays handed to Embree")                                                      \
+  X(line_segments, "rays that met an uncertain region of a process")                         \
+  X(line_skipped, "rays certain to miss a process: nothing drawn")                           \
+  X(line_evaluations, "evaluations of a process on a line")                                  \
+  X(line_normals, "normal random numbers drawn for lines and gradients")                     \
+  X(line_splits, "steps divided because a root could hide in them")                          \
+  X(line_step_limit, "lines ended by the bound on steps per ray")                            \
+  X(line_entry_inside, "lines found inside on re-entry after a skip")                        \
+  X(line_slope_floor, "starts or hits whose slope had the wrong sign by rounding")           \
+  X(line_split_limit, "steps no longer divided: narrower than the tolerance")                \
+  X(factorisations, "covariance matrices factorised")                                        \
+  X(field_lookups, "evaluations of mean or deviation fields")                                \
+  X(truncated_normals, "starts drawn conditioned on being outside")                          \
+  X(nan_samples, "samples that were not finite: counted, logged and left out of the film")   \
   X(clamped_samples, "samples reduced by the clamp setting")
 
 namespace gpis {
