@@ -23,7 +23,8 @@
   X(line_slope_floor, "starts or hits whose slope had the wrong sign by rounding")           \
   X(line_split_limit, "steps no longer divided: narrower than the tolerance")                \
   X(factorisations, "covariance matrices factorised")                                        \
-  X(field_lookups, "evaluations of mean or deviation fields")                                \
+  X(mean_lookups, "evaluations of a mean that is not constant")                              \
+  X(sigma_lookups, "evaluations of a deviation that is not constant")                        \
   X(truncated_normals, "starts drawn conditioned on being outside")                          \
   X(nan_samples, "samples that were not finite: counted, logged and left out of the film")   \
   X(clamped_samples, "samples reduced by the clamp setting")

@@ -18,7 +18,7 @@ class ConvolutionPath {
   static constexpr double kStep = 0.5;  // h, also the march's natural step
   static constexpr int kNodes = 16;     // nodes in reach of one cell [kh, (k+1)h): k-7 … k+8
 
-  void reset(double /*reach*/) {
+  void reset(double /*reach*/, Counters&) {
     nodes_.clear();
     runs_.clear();
   }

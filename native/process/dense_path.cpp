@@ -1,7 +1,6 @@
 #include "process/dense_path.h"
 
 #include <Eigen/Eigenvalues>
-#include <atomic>
 #include <cmath>
 #include <mutex>
 #include <stdexcept>
@@ -10,7 +9,6 @@ namespace gpis {
 namespace {
 
 constexpr double kReaches[] = {8, 24, DensePath::kMaxReach};
-std::atomic<int> g_factorisations{0};
 
 // Covariance of (g, g') at two points q apart, κ = exp(-q²/2): cov(g,g) = κ, cov(g, g') = -∂κ/∂q…
 Eigen::Matrix2d block(double q) {
@@ -22,16 +20,12 @@ Eigen::Matrix2d block(double q) {
 
 }  // namespace
 
-int DensePath::factorisations() {
-  return g_factorisations;
-}
-
-const DensePath::Factor& DensePath::factor(double reach) {
+const DensePath::Factor& DensePath::factor(double reach, Counters& counters) {
   static Factor factors[3];
   static std::once_flag once[3];
   int i = 0;
   while (i < 2 && reach > kReaches[i]) ++i;
-  std::call_once(once[i], [i] {
+  std::call_once(once[i], [i, &counters] {
     const int points = static_cast<int>(std::lround(kReaches[i] / kStep)) + 2;
     Eigen::MatrixXd k(2 * points, 2 * points);
     for (int r = 0; r < points; ++r)
@@ -44,19 +38,19 @@ const DensePath::Factor& DensePath::factor(double reach) {
     int rank = 0;
     while (rank < values.size() && values[values.size() - 1 - rank] > floor) ++rank;
     factors[i] = eigen.eigenvectors().rightCols(rank) * values.tail(rank).cwiseSqrt().asDiagonal();
-    ++g_factorisations;
+    ++counters.factorisations;
   });
   return factors[i];
 }
 
-void DensePath::reset(double reach) {
+void DensePath::reset(double reach, Counters& counters) {
   if (reach > kMaxReach)
     throw std::invalid_argument(
         "The dense sampler serves lines of up to 64 length scales inside the uncertain region, "
         "this one has " +
         std::to_string(reach) +
         ": take the convolution sampler, a longer length_scale or smaller bounds.");
-  factor_ = &factor(reach);
+  factor_ = &factor(reach, counters);
   drawn_ = false;
 }
 

@@ -18,20 +18,17 @@ class DensePath {
   static constexpr double kMaxReach = 64;  // length scales that one joint sample can cover
 
   // A line of at most `reach` length scales, drawn at once.
-  void reset(double reach);
+  void reset(double reach, Counters& counters);
   void prepare(long cell, Rng& rng, Counters& counters);
   void at_left(long cell, double& g, double& dg) const { point(cell, g, dg); }
   void at_right(long cell, double& g, double& dg) const { point(cell + 1, g, dg); }
   void at(long cell, double q, double& g, double& dg) const;
 
-  // Covariances factorised so far in this program (for the test that a ray does none).
-  static int factorisations();
-
  private:
   // K = F Fᵀ for the interleaved vector (g_0, g'_0, g_1, g'_1, …), columns the significant
   // eigenvectors: eigenvalues below 1e-14 of the largest are rounding noise of the matrix itself.
   using Factor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  static const Factor& factor(double reach);
+  static const Factor& factor(double reach, Counters& counters);
 
   void point(long k, double& g, double& dg) const {
     g = factor_->row(2 * k).dot(modes_);

@@ -13,7 +13,7 @@ namespace gpis {
 class ZeroPath {
  public:
   static constexpr double kStep = 0.5;
-  void reset(double) {}
+  void reset(double, Counters&) {}
   void prepare(long, Rng&, Counters&) {}
   void at_left(long, double& g, double& dg) const { g = dg = 0; }
   void at_right(long, double& g, double& dg) const { g = dg = 0; }

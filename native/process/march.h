@@ -47,7 +47,7 @@ class March {
     }
     ++counters_.line_segments;
     line_.anchor = a;
-    path_.reset((t_end - a) * line_.inverse_length);
+    path_.reset((t_end - a) * line_.inverse_length, counters_);
     cell_ = 0;
     path_.prepare(0, rng_, counters_);
     double b = step_end(a, t_end);
@@ -136,6 +136,8 @@ class March {
     p.f = p.mean + p.sigma * g;
     p.df = dmean + p.dsigma * g + p.sigma * dg * line_.inverse_length;
     ++counters_.line_evaluations;
+    counters_.mean_lookups += MeanLine::kLookups;
+    counters_.sigma_lookups += SigmaLine::kLookups;
     return p;
   }
 

@@ -15,6 +15,7 @@ template <class F, bool breaks>
 class DirectLine {
  public:
   static constexpr bool kBreaks = breaks;
+  static constexpr int kLookups = std::is_same_v<F, ConstantField> ? 0 : 1;
   DirectLine(const Field& field, const Vec3& o, const Vec3& d)
       : line_(static_cast<const F&>(field), o, d) {}
   double next_break(double t) const { return line_.next_break(t); }
@@ -33,6 +34,7 @@ class DirectLine {
 class AnyLine {
  public:
   static constexpr bool kBreaks = true;
+  static constexpr int kLookups = 1;
   AnyLine(const Field& field, const Vec3& o, const Vec3& d) : line_(field.line(o, d)) {}
   double next_break(double t) const { return line_->next_break(t); }
   void enter(double a, double b) { line_->enter(a, b); }

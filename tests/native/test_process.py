@@ -1,0 +1,338 @@
+"""The process on a line against exact answers (design oracles, numbered as there) and against explicit realisations."""
+
+import gpis_native as gn
+import numpy as np
+import pytest
+from statistics_checks import check_proportion, check_same_distribution, check_z
+
+pytestmark = pytest.mark.stats
+SAMPLERS = ["convolution", "dense"]
+LINE = ((-1, -1, -1), (12, 1, 1))  # bounds around the x axis, short enough for the dense sampler
+
+
+@pytest.fixture
+def n(full_size):
+    return 2_000_000 if full_size else 200_000
+
+
+def along_x(n, x=0.0):
+    origins = np.zeros((n, 3))
+    origins[:, 0] = x
+    return origins, np.tile([1.0, 0.0, 0.0], (n, 1))
+
+
+def standard(mean=0.0, sigma=1.0, bounds=LINE, length_scale=1.0):
+    return gn.GaussianProcess(mean, sigma, gn.SquaredExponential(length_scale), bounds=bounds)
+
+
+@pytest.mark.parametrize("sampler", SAMPLERS)
+@pytest.mark.parametrize(
+    ("start", "memory", "survival"),
+    [
+        ("outside", "renewal+", [0.84229, 0.69407, 0.45573, 0.12893, 0.03639]),
+        ("surface", "renewal", [0.96922, 0.88063, 0.61086, 0.17080, 0.04818]),
+        ("slope 1", "renewal+", [0.99669, 0.88074, 0.58803, 0.16682, 0.04701]),
+    ],
+)
+def test_survival_of_the_squared_exponential(sampler, start, memory, survival, n, seed):
+    """Oracle 6: brute force over 1.4 million paths, standard error 4e-4."""
+    origins, directions = along_x(n)
+    state = None
+    if start != "outside":
+        state = {"value": np.zeros(n), "gradient": np.tile([1.0, 0.3, -0.2], (n, 1))}
+    hits = gn.first_hits(standard(), origins, directions, 9, memory=memory, start=state, sampler=sampler, seed=seed)
+    times = [0.5, 1, 2, 5, 8]
+    check_proportion([np.sum(hits["t"] > t) for t in times], n, survival, 4e-4, f"{sampler}, {start}")
+
+
+@pytest.mark.parametrize("sampler", SAMPLERS)
+@pytest.mark.parametrize("start", ["outside", "value and slope"])
+def test_implied_correlation(sampler, start, n, seed):
+    """Correlation of the values that a render's own line takes, at nodes, between them and across many cells.
+
+    The mean of 5 deviations keeps every path outside; the tolerance makes the sampler draw there.
+    """
+    gp, (origins, directions) = standard(5.0), along_x(n)
+    t = np.array([0.05, 0.3, 0.5, 0.77, 1.0, 1.9, 2.6, 4.0])
+    state = None
+    if start != "outside":
+        state = {"value": np.full(n, 5.5), "gradient": np.tile([-0.4, 0.1, 0.2], (n, 1))}
+    g = gn.line_values(gp, origins, directions, t, start=state, sampler=sampler, tolerance=1e-6, seed=seed) - 5
+    g = g[np.isfinite(g).all(axis=1)]
+    assert len(g) > 0.999 * n
+    lag = t[:, None] - t
+    covariance = np.exp(-(lag**2) / 2)
+    mean = np.zeros(len(t))
+    if start != "outside":  # condition on value .5 and slope -.4 at 0
+        k = np.exp(-(t**2) / 2)
+        mean = k * (0.5 - 0.4 * t)
+        covariance = covariance - np.outer(k, k) * (1 + np.outer(t, t))
+    m = len(g)
+    deviation = np.sqrt(np.diag(covariance))
+    check_z(g.mean(axis=0), mean, deviation / np.sqrt(m), "mean")
+    centred = g - mean
+    # What each sampler states of its own: the dense one interpolates between points by a cubic, off by 1e-4 deviations.
+    stated = {"convolution": 1e-7, "dense": 1e-4}[sampler] * np.add.outer(deviation, deviation)
+    error = np.sqrt((np.outer(deviation, deviation) ** 2 + covariance**2) / m)
+    difference = np.maximum(np.abs(centred.T @ centred / m - covariance) - stated, 0)
+    check_z(difference, 0, error, "covariance")
+
+
+def test_conditioned_start_at_tiny_distances(seed):
+    """Oracle 8: Var f = q⁴/2 close to a start with known value and slope, down to q = 1e-4."""
+    n = 20_000
+    origins, directions = along_x(n)
+    state = {"value": np.full(n, 5.0), "gradient": np.zeros((n, 3))}
+    t = np.array([1e-4, 1e-3, 1e-2])
+    v = gn.line_values(standard(5.0), origins, directions, t, start=state, tolerance=1e-6, seed=seed) - 5
+    check_z(np.mean(v**2, axis=0) / (t**4 / 2), 1.0, np.sqrt(2 / n))
+
+
+@pytest.mark.parametrize("sampler", SAMPLERS)
+def test_transverse_gradient_correlation(sampler, n, seed):
+    """Oracle 9: a remembered transverse gradient decays as exp(-q²/2); its residual has variance 1 - exp(-q²)."""
+    origins, directions = along_x(n)
+    start = np.tile([0.7, 1.5, -2.0], (n, 1))
+    hits = gn.first_hits(
+        standard(),
+        origins,
+        directions,
+        9,
+        start={"value": np.zeros(n), "gradient": start},
+        sampler=sampler,
+        seed=seed,
+    )
+    hit = np.isfinite(hits["t"])
+    c = np.exp(-(hits["t"][hit] ** 2) / 2)
+    for axis in (1, 2):
+        residual = hits["gradient"][hit, axis] - c * start[0, axis]
+        scaled = residual / np.sqrt(1 - c**2)
+        m = hit.sum()
+        check_z(scaled.mean(), 0, 1 / np.sqrt(m))
+        check_z((scaled**2).mean(), 1, np.sqrt(2 / m))
+        check_z((scaled * c).mean(), 0, np.sqrt((c**2).mean() / m))
+
+
+@pytest.mark.parametrize("memory", ["renewal", "renewal+", "none"])
+@pytest.mark.parametrize("mean", ["sphere", "slope"])
+def test_samplers_agree(memory, mean, n, seed):
+    """Two samplers, the same law of (t, gradient) at the first and the second hit."""
+    kernel = gn.SquaredExponential([0.3, 0.15, 0.2], rotation=[0.9, 0.3, -0.2, 0.1])
+    bounds = ((-1.5, -1.5, -1.5), (1.5, 1.5, 1.5))
+    field = gn.SphereField([0, 0, 0], 1) if mean == "sphere" else gn.PlaneField([0, 0, 0], [0, 0.6, 0.8], 0.7)
+    gp = gn.GaussianProcess(field, 0.12, kernel, bounds=bounds)
+    rng = np.random.default_rng(seed)
+    m = n // 4
+    origins = np.column_stack([rng.uniform(-0.6, 0.6, (m, 2)), np.full(m, 3.0)])
+    directions = np.array([0.2, -0.1, -1.0]) + rng.normal(0, 0.05, (m, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    results = {}
+    for i, sampler in enumerate(SAMPLERS):
+        first = gn.first_hits(gp, origins, directions, 10, sampler=sampler, seed=seed + 10 * i)
+        hit = np.isfinite(first["t"])
+        normal = first["gradient"][hit] / np.linalg.norm(first["gradient"][hit], axis=1, keepdims=True)
+        d = directions[hit]
+        out = d - 2 * np.sum(d * normal, axis=1, keepdims=True) * normal
+        state = {"value": first["state"]["value"][hit], "gradient": first["state"]["gradient"][hit]}
+        second = gn.first_hits(
+            gp, first["position"][hit], out, 10, memory=memory, start=state, sampler=sampler, seed=seed + 10 * i + 5
+        )
+        results[sampler] = first, second
+    for k, which in enumerate(["first", "second"]):
+        a, b = results["convolution"][k], results["dense"][k]
+        check_same_distribution(a["t"], b["t"], f"{which} t")
+        for axis in range(3):
+            pair = [h["gradient"][np.isfinite(h["t"]), axis] for h in (a, b)]
+            check_same_distribution(*pair, f"{which} gradient {axis}")
+
+
+@pytest.mark.parametrize("sampler", SAMPLERS)
+def test_first_hit_of_explicit_realisations(sampler, full_size, seed):
+    """A mean and a deviation that vary, drawn jointly by numpy on a grid of ℓ/40 to find changes of sign."""
+    n = 40_000 if full_size else 10_000
+    x = np.linspace(0, 3, 241)  # ℓ = .5
+    centre, radius, sigma_slope = 2.6, 1.0, 0.15
+    mean = np.abs(x - centre) - radius
+    sigma = 0.2 + sigma_slope * x
+    covariance = np.outer(sigma, sigma) * np.exp(-((x[:, None] - x) ** 2) / (2 * 0.25))
+    values, vectors = np.linalg.eigh(covariance)
+    factor = vectors * np.sqrt(np.maximum(values, 0))
+    f = mean + np.random.default_rng(seed).normal(size=(2 * n, len(x))) @ factor.T
+    f = f[f[:, 0] > 0][:n]  # a ray from outside
+    below = f < 0
+    first = np.argmax(below, axis=1)
+    rows = np.arange(len(f))
+    a, b = f[rows, np.maximum(first - 1, 0)], f[rows, first]
+    step = x[1] - x[0]
+    expected = np.where(below.any(axis=1), x[first] - step * b / np.where(a > b, b - a, -1), np.inf)
+    # The deviation is a plane, unbounded over all space: say where it is used.
+    gp = gn.GaussianProcess(
+        gn.SphereField([centre, 0, 0], radius),
+        (gn.PlaneField([0, 0, 0], [1, 0, 0], sigma_slope) + gn.ConstantField(0.2)).clamped(0, 0.66),
+        gn.SquaredExponential(0.5),
+        bounds=((0, -1, -1), (3, 1, 1)),
+    )
+    hits = gn.first_hits(gp, *along_x(len(f)), 3, sampler=sampler, seed=seed)
+    check_same_distribution(hits["t"], expected)
+
+
+@pytest.mark.parametrize("sampler", SAMPLERS)
+def test_infinite_length_scale_is_one_normal(sampler, n, seed):
+    """Oracle 14: f = μ + σξ with one ξ; a sphere is missed with probability Φ((b - R)/σ)."""
+    from math import erf, sqrt
+
+    gp = gn.GaussianProcess(
+        gn.SphereField([0, 0, 0], 1), 0.2, gn.SquaredExponential(1e4), bounds=((-3, -3, -3), (3, 3, 3))
+    )
+    for b in (0.7, 1.0, 1.2):
+        origins = np.tile([b, 0.0, 2.9], (n // 4, 1))
+        hits = gn.first_hits(gp, origins, np.tile([0.0, 0, -1], (n // 4, 1)), 6, sampler=sampler, seed=seed)
+        start_outside = 0.5 * (1 + erf(1.9 / 0.2 / sqrt(2)))
+        missed = (0.5 * (1 + erf((b - 1) / 0.2 / sqrt(2)))) / start_outside
+        check_proportion(np.sum(np.isinf(hits["t"])), n // 4, missed, what=f"b = {b}")
+
+
+@pytest.mark.parametrize("sigma", [0.0, 1e-12])
+def test_certain_surface(sigma, seed):
+    """Oracle 17: σ → 0 is the mean itself; nothing is drawn at σ = 0."""
+    rng = np.random.default_rng(seed)
+    origins = np.column_stack([rng.uniform(-1.2, 1.2, (5000, 2)), np.full(5000, 3.0)])
+    directions = np.tile([0.0, 0.0, -1.0], (5000, 1))
+    gp = gn.GaussianProcess(gn.SphereField([0, 0, 0], 1), sigma, gn.SquaredExponential(0.3))
+    hits = gn.first_hits(gp, origins, directions, 10, seed=seed)
+    b2 = np.sum(origins[:, :2] ** 2, axis=1)
+    clear = np.abs(b2 - 1) > 1e-9
+    expected = np.where(b2 < 1, 3 - np.sqrt(np.maximum(1 - b2, 0)), np.inf)
+    assert np.array_equal(np.isfinite(hits["t"])[clear], (b2 < 1)[clear])
+    hit = np.isfinite(hits["t"]) & clear
+    # The root moves by σ over the slope, which vanishes for rays that graze.
+    np.testing.assert_allclose(hits["t"][hit], expected[hit], atol=1e-9 + 100 * sigma / np.sqrt(1 - b2[hit]).min())
+    if sigma == 0:
+        np.testing.assert_allclose(hits["gradient"][hit], hits["position"][hit], atol=1e-9)
+        normals = hits["counters"]["line_normals"]
+        assert normals == 2 * np.isfinite(hits["t"]).sum()  # only the draw from the (certain) gradient law
+
+
+def visible_cosine(direction, slope, edges, rng, n=1_000_000):
+    """Histogram of n·ω where gradients follow (-d·g)₊ N(g; ∇μ, s²I): a first hit but for masking (oracle 12)."""
+    gradient = np.array([0, 0, 1]) + slope * rng.normal(size=(n, 3))
+    towards = -gradient @ direction
+    seen = towards / np.linalg.norm(gradient, axis=1)
+    histogram, _ = np.histogram(seen, edges, weights=np.maximum(towards, 0))
+    return histogram / histogram.sum()
+
+
+@pytest.mark.parametrize("degrees", [15, 45])
+def test_visible_normals_of_a_planar_mean(degrees, n, seed):
+    """Oracle 12, isotropic kernel at roughness α = √2 σ/ℓ of .1 and .5: total variation of n·ω below .01."""
+    theta = np.radians(degrees)
+    direction = np.array([-np.sin(theta), 0, -np.cos(theta)])
+    for alpha in (0.1, 0.5):
+        sigma = alpha * 0.1 / np.sqrt(2)
+        gp = gn.GaussianProcess(gn.PlaneField([0, 0, 0], [0, 0, 1], 1), sigma, gn.SquaredExponential(0.1))
+        origins = np.tile(-3 * direction, (n, 1))
+        hits = gn.first_hits(gp, origins, np.tile(direction, (n, 1)), 10, seed=seed)
+        hit = np.isfinite(hits["t"])
+        assert hit.mean() > 0.9999
+        normal = hits["gradient"][hit] / np.linalg.norm(hits["gradient"][hit], axis=1, keepdims=True)
+        seen = -normal @ direction
+        assert np.all(seen >= 0)
+        edges = np.linspace(0, 1, 21)
+        got, _ = np.histogram(seen, edges)
+        expected = visible_cosine(direction, alpha / np.sqrt(2), edges, np.random.default_rng(seed))
+        assert 0.5 * np.abs(got / hit.sum() - expected).sum() < 0.01
+
+
+def test_hits_on_grids_arrive_from_outside(seed):
+    """Definitions E8: with trilinear mean and deviation and the cell's own gradient, ∂_d f <= 0 at every hit."""
+    rng = np.random.default_rng(seed)
+    axis = np.linspace(-1.5, 1.5, 17)
+    x, y, z = np.meshgrid(axis, axis, axis, indexing="ij")
+    mean = gn.GridField(np.sqrt(x**2 + y**2 + z**2) - 1 + rng.normal(0, 0.05, x.shape), axis[1] - axis[0], [-1.5] * 3)
+    sigma = gn.GridField(rng.uniform(0.02, 0.25, x.shape), axis[1] - axis[0], [-1.5] * 3)
+    gp = gn.GaussianProcess(mean, sigma, gn.SquaredExponential(0.3))
+    m = 50_000
+    directions = rng.normal(size=(m, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    origins = -3 * directions + rng.uniform(-0.8, 0.8, (m, 3))
+    hits = gn.first_hits(gp, origins, directions, 10, seed=seed)
+    hit = np.isfinite(hits["t"])
+    assert hit.sum() > 0.3 * m
+    assert np.all(np.sum(hits["gradient"][hit] * directions[hit], axis=1) <= 0)
+    assert hits["counters"]["line_slope_floor"] == 0
+
+
+def test_grid_mean_equals_the_field_it_holds(n, seed):
+    """A plane is exact on a grid: the march through cells and the march in steps of ℓ/2 give one law."""
+    axis = np.linspace(-1, 1, 21)
+    x, y, z = np.meshgrid(axis, axis, axis, indexing="ij")
+    grid = gn.GridField(0.6 * y + 0.8 * z, 0.1, [-1.0] * 3)
+    direction = np.array([0.3, -0.2, -1.0]) / np.linalg.norm([0.3, -0.2, -1.0])
+    origins, directions = np.tile([-0.3, 0.2, 0.95], (n, 1)), np.tile(direction, (n, 1))
+    hits = [
+        gn.first_hits(
+            gn.GaussianProcess(mean, 0.15, gn.SquaredExponential(0.4), bounds=((-1, -1, -1), (1, 1, 1))),
+            origins,
+            directions,
+            5,
+            seed=seed + i,
+        )
+        for i, mean in enumerate([grid, gn.PlaneField([0, 0, 0], [0, 0.6, 0.8], 1)])
+    ]
+    check_same_distribution(hits[0]["t"], hits[1]["t"])
+    for axis in range(3):
+        check_same_distribution(*(h["gradient"][np.isfinite(h["t"]), axis] for h in hits))
+
+
+def test_what_is_not_needed_is_not_done(seed):
+    """Counters of the code that does the work: far rays draw nothing, a constant deviation is never looked up, a
+    stationary kernel factorises nothing per ray; the same counters move where the work is needed."""
+    sphere, kernel = gn.SphereField([0, 0, 0], 1), gn.SquaredExponential(0.1)
+    origins, directions = np.tile([0.0, 0, 3], (1000, 1)), np.tile([0.0, 0, -1], (1000, 1))
+    gp = gn.GaussianProcess(sphere, 0.05, kernel, bounds=((-1.5, -1.5, -1.5), (1.5, 1.5, 1.5)))
+    far = gn.first_hits(gp, origins + [2.0, 0, 0], directions, 10, seed=seed)["counters"]
+    assert far["line_skipped"] == 1000
+    assert far["line_normals"] == far["line_evaluations"] == far["mean_lookups"] == 0
+    near = gn.first_hits(gp, origins, directions, 10, seed=seed)["counters"]
+    assert near["line_segments"] == 1000 and near["line_normals"] > 16_000 and near["mean_lookups"] > 0
+    assert near["sigma_lookups"] == near["factorisations"] == 0
+    clamped = gn.GaussianProcess(sphere, gn.ConstantField(0.05).clamped(0, 1), kernel)
+    assert gn.first_hits(clamped, origins, directions, 10, seed=seed)["counters"]["sigma_lookups"] > 0
+    dense = gn.first_hits(gp, origins, directions, 10, sampler="dense", seed=seed)["counters"]
+    assert dense["factorisations"] <= 1  # the first use in this process, for all its rays
+    again = gn.first_hits(gp, origins, directions, 10, sampler="dense", seed=seed)["counters"]
+    assert again["factorisations"] == 0
+
+
+def test_streams_depend_on_the_row_alone(seed):
+    gp = gn.GaussianProcess(gn.SphereField([0, 0, 0], 1), 0.2, gn.SquaredExponential(0.3))
+    origins, directions = np.tile([0.1, 0.2, 3], (2000, 1)), np.tile([0.0, 0, -1], (2000, 1))
+    whole = gn.first_hits(gp, origins, directions, 10, seed=seed, threads=1)
+    part = gn.first_hits(gp, origins[700:], directions[700:], 10, seed=seed, first_index=700, threads=2)
+    np.testing.assert_array_equal(whole["t"][700:], part["t"])
+    np.testing.assert_array_equal(whole["gradient"][700:], part["gradient"])
+    other = gn.first_hits(gp, origins, directions, 10, seed=seed + 1)
+    assert np.mean(whole["t"] == other["t"]) < 0.01
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (lambda: gn.SquaredExponential(0), "length_scale must be positive"),
+        (lambda: gn.SquaredExponential([1, 2]), "three numbers"),
+        (lambda: gn.GaussianProcess(0, -1, gn.SquaredExponential(1)), "sigma must not be negative"),
+        (lambda: gn.GaussianProcess("x", 1, gn.SquaredExponential(1)), "mean must be a field or a number"),
+        (
+            lambda: gn.GaussianProcess(0, 1, gn.SquaredExponential(1), bounds=((0, 0, 0), (1, 0, 1))),
+            "min must be below",
+        ),
+        (lambda: gn.first_hits(standard(), [[0, 0, 0]], [[2, 0, 0]], 1), "must have length 1"),
+        (lambda: gn.first_hits(standard(), [[0, 0, np.nan]], [[1, 0, 0]], 1), "is not finite"),
+        (lambda: gn.first_hits(standard(), [[0, 0, 0]], [[1, 0, 0]], 1, memory="all"), "'renewal+'"),
+        (lambda: gn.first_hits(standard(), [[0, 0, 0]], [[1, 0, 0]], 1, start={"valeu": [0]}), "unknown key 'valeu'"),
+        (lambda: gn.first_hits(standard(bounds=None), [[0, 0, 0]], [[1, 0, 0]], 1, sampler="dense"), "smaller bounds"),
+    ],
+)
+def test_bad_input_gets_a_sentence(make, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        make()

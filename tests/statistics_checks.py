@@ -1,0 +1,35 @@
+"""Tests of hypotheses with a stated significance, shared by the statistical tests.
+
+SIGNIFICANCE is for one comparison: small enough that all comparisons of the suite together (some thousands) raise a
+false alarm with probability below 1e-3.
+"""
+
+import math
+
+import numpy as np
+
+SIGNIFICANCE = 1e-7
+Z_LIMIT = 5.33  # two-sided normal quantile of SIGNIFICANCE
+
+
+def check_z(value, expected, standard_error, what=""):
+    """Two-sided z-test of a mean, element by element."""
+    z = (np.asarray(value) - expected) / standard_error
+    assert np.all(np.abs(z) < Z_LIMIT), f"{what}: z = {np.round(z, 2)}, {value} against {expected}"
+
+
+def check_proportion(hits, n, expected, expected_error=0.0, what=""):
+    """z-test of a count against a probability that itself has a standard error."""
+    expected = np.asarray(expected, dtype=float)
+    variance = expected * (1 - expected) / n + np.square(expected_error)
+    check_z(np.asarray(hits) / n, expected, np.sqrt(np.maximum(variance, 0.25 / n**2)), what)
+
+
+def check_same_distribution(a, b, what=""):
+    """Two-sample Kolmogorov-Smirnov test; infinite values take part as the largest."""
+    a, b = np.sort(a), np.sort(b)
+    both = np.concatenate([a[np.isfinite(a)], b[np.isfinite(b)]])
+    distance = np.max(np.abs(np.searchsorted(a, both, "right") / len(a) - np.searchsorted(b, both, "right") / len(b)))
+    n = math.sqrt(len(a) * len(b) / (len(a) + len(b)))
+    p = min(1.0, 2 * math.exp(-2 * (n * distance) ** 2))
+    assert p > SIGNIFICANCE, f"{what}: KS distance {distance:.5f}, p = {p:.1e}"
