@@ -1,5 +1,7 @@
 #include "binding/arguments.h"
 
+#include <pybind11/numpy.h>
+
 #include "field/constant_field.h"
 
 namespace gpis {
@@ -21,6 +23,15 @@ Memory memory_argument(const std::string& value, const std::string& name) {
   if (value == "renewal+") return Memory::renewal_plus;
   throw std::invalid_argument(name + " is '" + value +
                               "', it takes 'none', 'renewal' or 'renewal+'.");
+}
+
+Vec3 vec_or_number(const py::handle& value, const std::string& name) {
+  const auto a = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(value);
+  if (a && a.ndim() == 0) return Vec3{1, 1, 1} * *a.data();
+  if (a && a.ndim() == 1 && a.shape(0) == 3) return {a.at(0), a.at(1), a.at(2)};
+  PyErr_Clear();
+  throw std::invalid_argument(name + " must be a number or three numbers, it is " +
+                              py::repr(value).cast<std::string>() + ".");
 }
 
 py::dict counters_dict(const Counters& counters) {

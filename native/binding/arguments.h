@@ -15,6 +15,9 @@ FieldPtr field_argument(const pybind11::handle& value, const std::string& name);
 // 'none', 'renewal' or 'renewal+'.
 Memory memory_argument(const std::string& value, const std::string& name);
 
+// Three numbers, or one that stands for all three.
+Vec3 vec_or_number(const pybind11::handle& value, const std::string& name);
+
 pybind11::dict counters_dict(const Counters& counters);
 
 }  // namespace gpis

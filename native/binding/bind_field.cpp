@@ -3,6 +3,7 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include "binding/arguments.h"
 #include "binding/bindings.h"
 #include "field/box_field.h"
 #include "field/check.h"
@@ -72,15 +73,6 @@ Affine affine_argument(const Array& m) {
   return a;
 }
 
-// A number, or one for each axis.
-Vec3 voxel_argument(const py::object& value) {
-  if (py::isinstance<py::sequence>(value) ||
-      (py::isinstance<py::array>(value) && py::len(value) == 3))
-    return to_vec(value.cast<Triple>());
-  const double size = value.cast<double>();
-  return {size, size, size};
-}
-
 std::shared_ptr<GridField> make_grid(const Array& values, const py::object& voxel_size,
                                      const Triple& origin, std::optional<double> background) {
   if (values.ndim() != 3)
@@ -100,8 +92,9 @@ std::shared_ptr<GridField> make_grid(const Array& values, const py::object& voxe
                      static_cast<int>(v.shape(2))};
   auto grid = std::make_shared<BrickGrid>(
       nodes, [&](int i, int j, int k) { return static_cast<float>(v(i, j, k)); });
-  return std::make_shared<GridField>(std::move(grid), voxel_argument(voxel_size), to_vec(origin),
-                                     background);
+  return std::make_shared<GridField>(std::move(grid),
+                                     vec_or_number(voxel_size, "GridField: voxel_size"),
+                                     to_vec(origin), background);
 }
 
 py::object support_of(const Field& field) {

@@ -9,5 +9,6 @@ PYBIND11_MODULE(gpis_native, m) {
       "transport on them.";
   gpis::bind_build_info(m);
   gpis::bind_field(m);
+  gpis::bind_vdb(m);
   gpis::bind_process(m);
 }

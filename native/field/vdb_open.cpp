@@ -1,0 +1,86 @@
+#include "field/vdb_open.h"
+
+#include <filesystem>
+
+#pragma GCC visibility push(default)
+#include <openvdb/tools/SignedFloodFill.h>
+#pragma GCC visibility pop
+
+#include "core/errors.h"
+#include "field/check.h"
+
+namespace gpis {
+namespace {
+
+template <class Action>
+auto with_file(const std::string& path, const Action& action) {
+  std::error_code error;
+  if (!std::filesystem::exists(path, error))
+    throw FileNotFound("There is no file \"" + path + "\".");
+  if (!std::filesystem::is_regular_file(path, error))
+    refuse("\"", path, "\" is not a file; it takes the path of a .vdb file.");
+  return with_vdb_errors(path, "read", [&] {
+    openvdb::initialize();
+    openvdb::io::File file(path);
+    file.open(/*delayLoad=*/false);
+    return action(file);
+  });
+}
+
+// A file may leave the inactive voxels of a level set without their sign.
+template <class GridType>
+void fill_level_set(openvdb::GridBase& grid) {
+  if (!grid.isType<GridType>() || grid.getGridClass() != openvdb::GRID_LEVEL_SET) return;
+  auto& tree = static_cast<GridType&>(grid).tree();
+  const auto outside = openvdb::math::Abs(tree.background());
+  openvdb::tools::signedFloodFillWithValues(tree, outside, -outside);
+  static_cast<GridType&>(grid).tree().root().setBackground(outside, /*updateChildNodes=*/false);
+}
+
+void prepare(const std::string& path, openvdb::GridBase& grid) {
+  if (!grid.transform().isLinear())
+    refuse("Grid '", grid.getName(), "' of \"", path,
+           "\" lies in a perspective frustum; only affine transforms can be read: resample it.");
+  fill_level_set<openvdb::FloatGrid>(grid);
+  fill_level_set<openvdb::DoubleGrid>(grid);
+}
+
+std::vector<std::string> names_in(const openvdb::io::File& file) {
+  std::vector<std::string> names;
+  for (auto name = file.beginName(); name != file.endName(); ++name)
+    names.push_back(name.gridName());
+  return names;
+}
+
+}  // namespace
+
+std::vector<std::string> vdb_grid_names(const std::string& path) {
+  return with_file(path, names_in);
+}
+
+openvdb::GridBase::Ptr open_vdb_grid(const std::string& path, const std::string& name) {
+  return with_file(path, [&](openvdb::io::File& file) {
+    if (!file.hasGrid(name)) {
+      std::string all;
+      for (const std::string& other : names_in(file)) all += (all.empty() ? "" : ", ") + other;
+      refuse("\"", path, "\" has no grid '", name, "'; it holds: ", all.empty() ? "none" : all,
+             ".");
+    }
+    auto grid = file.readGrid(name);
+    prepare(path, *grid);
+    return grid;
+  });
+}
+
+// OpenVDB maps row vectors.
+Affine index_to_object(const openvdb::GridBase& grid) {
+  const openvdb::Mat4d m = grid.transform().baseMap()->getAffineMap()->getMat4();
+  Affine a;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) a.linear.row[i][j] = m(j, i);
+    a.translation[i] = m(3, i);
+  }
+  return a;
+}
+
+}  // namespace gpis

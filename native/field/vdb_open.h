@@ -1,0 +1,32 @@
+// Opening .vdb files, for the readers in this folder.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/vec.h"
+#include "field/openvdb.h"
+
+namespace gpis {
+
+// OpenVDB's types are known and its exceptions become sentences that name the file.
+std::vector<std::string> vdb_grid_names(const std::string& path);
+// With voxels; a level set has its inside and outside filled with the sign they need. Refuses a
+// name that is not there, and a transform that is not affine.
+openvdb::GridBase::Ptr open_vdb_grid(const std::string& path, const std::string& name);
+
+// The map from index to object space.
+Affine index_to_object(const openvdb::GridBase& grid);
+
+// Makes OpenVDB's own exceptions std::invalid_argument with the path. `doing`: "read" or "written".
+template <class Action>
+auto with_vdb_errors(const std::string& path, const char* doing, const Action& action) {
+  try {
+    return action();
+  } catch (const openvdb::Exception& e) {
+    throw std::invalid_argument("\"" + path + "\" could not be " + doing +
+                                " as an OpenVDB file: " + e.what() + ".");
+  }
+}
+
+}  // namespace gpis
