@@ -21,7 +21,7 @@ Triple to_triple(const Vec3& v) {
   return {v.x, v.y, v.z};
 }
 py::object voxel_size_object(const Vec3& v) {
-  const bool cubic = std::abs(v.x - v.y) < 1e-12 * v.x && std::abs(v.x - v.z) < 1e-12 * v.x;
+  const bool cubic = std::abs(v.x - v.y) < 1e-6 * v.x && std::abs(v.x - v.z) < 1e-6 * v.x;
   return cubic ? py::object(py::float_(v.x)) : py::cast(to_triple(v));
 }
 

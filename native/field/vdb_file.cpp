@@ -53,7 +53,6 @@ void put(openvdb::GridPtrVec& out, const VdbArrays& arrays, const VdbArray& arra
           voxels.setValueOn({i, j, k}, Value(v[0], v[1], v[2]));
       }
   grid->setName(array.name);
-  const Vec3 h = arrays.voxel_size, o = arrays.origin;
   openvdb::Mat4d map = openvdb::Mat4d::identity();
   for (int i = 0; i < 3; ++i) {
     map(i, i) = arrays.voxel_size[i];
