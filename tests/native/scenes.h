@@ -1,7 +1,11 @@
 // Small scenes for the transport tests.
 #pragma once
 
+#include "check.h"
 #include "core/rng.h"
+#include "field/constant_field.h"
+#include "field/sphere_field.h"
+#include "integrator/path_tracer.h"
 #include "scene/scene.h"
 
 namespace gpis::test {
@@ -83,6 +87,63 @@ inline void set_world_image(SceneDescription& scene, int width, int height, doub
   scene.world.image_width = width;
   scene.world.image_height = height;
   scene.world.image.assign(3ull * width * height, static_cast<float>(value));
+}
+
+// A sphere of radius 1 as a distance mean.
+inline std::shared_ptr<GaussianProcess> sphere_process(double length_scale, double sigma,
+                                                       const Vec3& center = {}) {
+  const double reach = 1 + 6 * sigma;
+  const Vec3 r{reach, reach, reach};
+  return std::make_shared<GaussianProcess>(GaussianProcess{
+      std::make_shared<SphereField>(center, 1), std::make_shared<ConstantField>(sigma),
+      SquaredExponential({length_scale, length_scale, length_scale}),
+      Box3{center - r, center + r}});
+}
+
+inline void add_process(SceneDescription& scene, std::shared_ptr<const GaussianProcess> process,
+                        int material, Memory memory, const Affine& matrix = {}) {
+  ObjectDescription o;
+  o.type = ObjectDescription::Type::gpis;
+  o.process = std::move(process);
+  o.materials = {material};
+  o.memory = memory;
+  o.matrix = matrix;
+  scene.objects.push_back(o);
+}
+
+struct Render {
+  Mean radiance;
+  Counters counters;
+};
+
+// Red of many paths along rays made by `ray(rng)`.
+template <class MakeRay>
+Render trace(const SceneDescription& description, const MakeRay& ray, int paths,
+             std::uint64_t seed = 1) {
+  const Scene scene(description);
+  PathTracer tracer(scene);
+  Render result;
+  for (int i = 0; i < paths; ++i) {
+    Rng rng(seed, i);
+    const Ray r = ray(rng);
+    result.radiance.add(tracer.trace(r, kInfinity, rng, result.counters).radiance.x);
+  }
+  return result;
+}
+
+inline Vec3 any_direction(Rng& rng) {
+  for (;;) {
+    const Vec3 v{rng.normal(), rng.normal(), rng.normal()};
+    if (length(v) > 1e-3) return normalize(v);
+  }
+}
+
+inline LightDescription light(LightDescription::Type type, const Vec3& at) {
+  LightDescription l;
+  l.type = type;
+  l.matrix = placed(at);
+  l.power = 100;
+  return l;
 }
 
 }  // namespace gpis::test

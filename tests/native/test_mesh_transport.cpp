@@ -1,47 +1,11 @@
 // Path tracing over meshes against closed forms.
 #include "check.h"
-#include "integrator/path_tracer.h"
 #include "scenes.h"
 
 using namespace gpis;
 using namespace gpis::test;
 
 namespace {
-
-struct Render {
-  Mean radiance;
-  Counters counters;
-};
-
-// Red of many paths along rays made by `ray(rng)`.
-template <class MakeRay>
-Render trace(const SceneDescription& description, const MakeRay& ray, int paths,
-             std::uint64_t seed = 1) {
-  const Scene scene(description);
-  PathTracer tracer(scene);
-  Render result;
-  for (int i = 0; i < paths; ++i) {
-    Rng rng(seed, i);
-    const Ray r = ray(rng);
-    result.radiance.add(tracer.trace(r, kInfinity, rng, result.counters).radiance.x);
-  }
-  return result;
-}
-
-Vec3 any_direction(Rng& rng) {
-  for (;;) {
-    const Vec3 v{rng.normal(), rng.normal(), rng.normal()};
-    if (length(v) > 1e-3) return normalize(v);
-  }
-}
-
-LightDescription light(LightDescription::Type type, const Vec3& at) {
-  LightDescription l;
-  l.type = type;
-  l.matrix = placed(at);
-  l.power = 100;
-  return l;
-}
 
 SceneDescription bowl_and_spheres(bool smooth) {
   SceneDescription s;

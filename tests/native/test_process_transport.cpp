@@ -1,0 +1,131 @@
+// Path tracing over stochastic surfaces: nothing is lost (oracle 13), and light sampling changes
+// nothing (oracle 19).
+#include "chi_squared.h"
+#include "integrator/scatter.h"
+#include "scenes.h"
+
+using namespace gpis;
+using namespace gpis::test;
+
+namespace {
+
+const char* name_of(Memory m) {
+  return m == Memory::none ? "none" : m == Memory::renewal ? "renewal" : "renewal+";
+}
+constexpr Memory kMemories[] = {Memory::none, Memory::renewal, Memory::renewal_plus};
+using Type = MaterialDescription::Type;
+
+// Parallel rays along -z over the disk of radius 1.3.
+Ray over_the_sphere(Rng& rng) {
+  const double r = 1.3 * std::sqrt(rng.uniform()), phi = 2 * kPi * rng.uniform();
+  return {{r * std::cos(phi), r * std::sin(phi), 4}, {0, 0, -1}};
+}
+
+SceneDescription sphere_scene(double length_scale, double sigma, Memory memory,
+                              const MaterialDescription& m) {
+  SceneDescription s;
+  s.materials = {m};
+  add_process(s, sphere_process(length_scale, sigma), 0, memory);
+  return s;
+}
+
+}  // namespace
+
+TEST(process_furnace_is_one) {
+  // Issue: sigma = l/2 and 2l, Lambert and mirror, every memory, light sampling off and on.
+  for (const double ratio : {0.5, 2.0})
+    for (const Type type : {Type::lambert, Type::mirror})
+      for (const Memory memory : kMemories)
+        for (const bool sampling : {false, true}) {
+          context() = std::string(name_of(memory)) +
+                      (type == Type::mirror ? ", mirror" : ", lambert") + ", sigma/l " +
+                      std::to_string(ratio) + (sampling ? ", light sampling" : "");
+          SceneDescription s = sphere_scene(0.1, 0.1 * ratio, memory, material(type, 1));
+          if (sampling) {
+            set_world_image(s, 8, 4, 1);
+          } else {
+            s.world.color = {1, 1, 1};
+          }
+          const Render r = trace(s, over_the_sphere, 4000, 11);
+          std::cout << context() << ": " << r.radiance.mean() << " +- " << r.radiance.error()
+                    << ", vertices " << r.counters.path_vertices << " limit "
+                    << r.counters.path_length_limit << " steps " << r.counters.line_step_limit
+                    << std::endl;
+          CHECK(std::abs(r.radiance.z(1)), <, 4.0);
+          if (!sampling) CHECK(r.radiance.error(), <, 1e-9);
+          CHECK(r.counters.path_length_limit, ==, 0u);
+          CHECK(r.counters.line_step_limit, ==, 0u);
+          CHECK((r.counters.shadow_rays > 0), ==, sampling);
+        }
+}
+
+TEST(mirror_scatter_follows_its_density) {
+  const Vec3 d = normalize({0.2, -0.3, -1});
+  const Frame f(d);
+  const auto mirror = make_mirror({1, 1, 1}, {1, 1, 1});
+  for (const double spread : {0.2, 1.0, 3.0}) {
+    context() = "spread " + std::to_string(spread);
+    GradientLaw law;
+    law.mean = f.n * -0.8 + f.s * 0.3 + f.t * 0.1;
+    law.b1 = (f.s * 0.9 + f.t * 0.2) * spread;
+    law.b2 = f.t * (0.5 * spread);
+    const MirrorScatter scatter(*mirror, d, law);
+    const auto sample = [&](Rng& rng) -> std::optional<Vec3> {
+      const ScatterSample s = scatter.sample(law.draw(rng));
+      CHECK(std::abs(s.pdf - scatter.pdf(s.direction)), <=, 1e-12 * s.pdf);
+      return s.direction;
+    };
+    const ChiSquared result = chi_squared(
+        sample, [&](const Vec3& w) { return scatter.pdf(w); }, 100'000, 9);
+    CHECK(result.p_value, >, 3e-4);
+    CHECK(std::abs(result.total - 1), <, 0.01);
+    Rng rng(1, 0);
+    for (int n = 0; n < 100; ++n) {
+      const Vec3 g = law.draw(rng);
+      const Vec3 back = *scatter.gradient_for(scatter.sample(g).direction);
+      CHECK(length(back - g), <, 1e-9 * length(g));
+    }
+  }
+}
+
+TEST(mirror_process_shows_lights_alike_by_both_strategies) {
+  for (const Memory memory : kMemories) {
+    context() = name_of(memory);
+    SceneDescription s = sphere_scene(0.3, 0.1, memory, material(Type::mirror, 0.9));
+    s.lights = {light(LightDescription::Type::point, {2, 1, 3}),
+                light(LightDescription::Type::sun, {})};
+    s.lights[0].radius = 1;
+    s.lights[1].angle = 1.0;
+    s.lights[1].power = 3;
+    s.lights[1].matrix = placed({}, 1, {-2, 1, 1});
+    const Render on = trace(s, over_the_sphere, 40'000, 1);
+    s.settings.light_sampling = false;
+    const Render off = trace(s, over_the_sphere, 120'000, 2);
+    std::cout << context() << " on " << on.radiance.mean() << " +- " << on.radiance.error()
+              << " off " << off.radiance.mean() << " +- " << off.radiance.error() << std::endl;
+    CHECK(std::abs(on.radiance.z(off.radiance)), <, 4.0);
+    CHECK(on.radiance.error(), <, 0.02 * on.radiance.mean());
+  }
+}
+
+TEST(mirror_process_shows_a_sun_of_no_size) {
+  // The limit of small disks: a direction is reached by light sampling alone.
+  for (const Memory memory : kMemories) {
+    context() = name_of(memory);
+    SceneDescription s = sphere_scene(0.3, 0.1, memory, material(Type::mirror, 0.9));
+    s.lights = {light(LightDescription::Type::sun, {})};
+    s.lights[0].matrix = placed({}, 1, {-2, 1, 1});
+    const Render point = trace(s, over_the_sphere, 40'000, 3);
+    s.lights[0].angle = 0.05;
+    const Render disk = trace(s, over_the_sphere, 40'000, 4);
+    s.settings.light_sampling = false;
+    s.lights[0].angle = 0.2;
+    const Render found = trace(s, over_the_sphere, 200'000, 5);
+    std::cout << context() << " delta " << point.radiance.mean() << " +- " << point.radiance.error()
+              << " disk " << disk.radiance.mean() << " +- " << disk.radiance.error() << " found "
+              << found.radiance.mean() << " +- " << found.radiance.error() << std::endl;
+    CHECK(point.radiance.mean(), >, 0.0);
+    CHECK(std::abs(point.radiance.z(disk.radiance)), <, 4.0);
+    CHECK(std::abs(point.radiance.z(found.radiance)), <, 4.0);
+  }
+}
