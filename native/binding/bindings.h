@@ -6,6 +6,7 @@
 
 namespace gpis {
 
+void bind_build_info(pybind11::module_& m);
 void bind_field(pybind11::module_& m);
 void bind_vdb(pybind11::module_& m);
 void bind_process(pybind11::module_& m);

@@ -1,7 +1,6 @@
 #include <pybind11/pybind11.h>
 
 #include "binding/bindings.h"
-#include "binding/build_info.h"
 
 PYBIND11_MODULE(gpis_native, m) {
   m.doc() =

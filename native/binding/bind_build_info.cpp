@@ -1,6 +1,6 @@
-#include "binding/build_info.h"
+#include "binding/bindings.h"
 
-#include "field/openvdb.h"
+#include "field/openvdb_version.h"
 #include "geometry/embree_api.h"
 
 namespace gpis {
