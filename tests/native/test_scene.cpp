@@ -121,5 +121,5 @@ TEST(what_a_scene_does_not_need_is_left_out) {
   const Counters c = trace(s, ray, 100).counters;
   CHECK(c.mesh_rays, >, 0u);
   CHECK(c.shadow_rays, ==, 0u);
-  CHECK(c.line_evaluations + c.line_skipped + c.field_lookups, ==, 0u);
+  CHECK(c.line_evaluations + c.line_skipped + c.mean_lookups, ==, 0u);
 }
