@@ -1,5 +1,5 @@
-// One function per folder of native/, each in a file of its own (bind_<folder>.cpp), called by module.cpp in this order:
-// a type must be known to Python before another one's signature names it.
+// One function per folder of native/ (render has two), each in a file of its own, called by module.cpp in an order in which a
+// type is known to Python before another one's signature names it.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -10,5 +10,8 @@ void bind_build_info(pybind11::module_& m);
 void bind_field(pybind11::module_& m);
 void bind_vdb(pybind11::module_& m);
 void bind_process(pybind11::module_& m);
+void bind_scene(pybind11::module_& m);
+void bind_film(pybind11::module_& m);
+void bind_render(pybind11::module_& m);
 
 }  // namespace gpis

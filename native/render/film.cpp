@@ -1,0 +1,170 @@
+#include "render/film.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace gpis {
+
+namespace {
+
+constexpr double kWideStep = 0x1p-64, kSquareStep = 0x1p-56, kNarrowStep = 0x1p-32;
+// Alpha, normal and albedo: beyond this a sum of 2^16 samples could overflow. Materials keep them far below.
+constexpr double kFeatureLimit = 0x1p15;
+
+Fixed to_fixed(double v, double step) { return static_cast<Fixed>(v / step); }
+std::int64_t to_narrow(double v) {
+  return static_cast<std::int64_t>(std::clamp(v, -kFeatureLimit, kFeatureLimit) / kNarrowStep);
+}
+double wide(Fixed v) { return static_cast<double>(v) * kWideStep; }
+double narrow(std::int64_t v) { return static_cast<double>(v) * kNarrowStep; }
+
+// S² / n of a sum of n samples: the block's term of Q.
+std::array<Fixed, 4> block_squares(const std::array<Fixed, 3>& radiance, std::uint32_t n) {
+  const Color s{wide(radiance[0]), wide(radiance[1]), wide(radiance[2])};
+  const double y = luminance(s);
+  return {to_fixed(s.x * s.x / n, kSquareStep), to_fixed(s.y * s.y / n, kSquareStep),
+          to_fixed(s.z * s.z / n, kSquareStep), to_fixed(y * y / n, kSquareStep)};
+}
+
+// Q of a pixel as a sum over blocks, whatever form it is kept in.
+std::array<Fixed, 4> squares_by_blocks(const PixelSums& p) {
+  return p.blocks == 1 ? block_squares(p.radiance, p.count) : p.squares;
+}
+
+void add_all_but_squares(PixelSums& to, const PixelSums& from) {
+  for (int c = 0; c < 3; ++c) {
+    to.radiance[c] += from.radiance[c];
+    to.normal[c] += from.normal[c];
+    to.albedo[c] += from.albedo[c];
+  }
+  to.depth += from.depth;
+  to.alpha += from.alpha;
+  to.count += from.count;
+  to.hits += from.hits;
+}
+
+void add_other_blocks(PixelSums& to, const PixelSums& from) {
+  if (from.blocks == 0) return;
+  if (to.blocks == 0) {
+    to = from;
+    return;
+  }
+  const auto a = squares_by_blocks(to), b = squares_by_blocks(from);
+  for (int c = 0; c < 4; ++c) to.squares[c] = a[c] + b[c];
+  add_all_but_squares(to, from);
+  to.blocks += from.blocks;
+}
+
+// Variance of the mean of channel c (3: luminance).
+double variance_of_mean(const PixelSums& p, int c) {
+  const double n = p.count, parts = p.blocks == 1 ? n : p.blocks;
+  if (!(parts >= 2)) return kInfinity;
+  const double s = c < 3 ? wide(p.radiance[c])
+                         : luminance({wide(p.radiance[0]), wide(p.radiance[1]), wide(p.radiance[2])});
+  const double q = static_cast<double>(p.squares[c]) * kSquareStep;
+  return std::max(0.0, (q - s * s / n) / ((parts - 1) * n));  // rounding may leave less than nothing
+}
+
+}  // namespace
+
+bool PixelBlock::add(const FilmSample& sample, Counters& counters) {
+  const bool hit = sample.depth < kInfinity;
+  if (!is_finite(sample.radiance) || !is_finite(sample.normal) || !is_finite(sample.albedo) ||
+      !std::isfinite(sample.alpha) || !(std::isfinite(sample.depth) || sample.depth == kInfinity)) {
+    ++counters.nan_samples;
+    return false;
+  }
+  Color radiance = sample.radiance;
+  for (int c = 0; c < 3; ++c) radiance[c] = std::clamp(radiance[c], -kRadianceLimit, kRadianceLimit);
+  if (length(radiance - sample.radiance) > 0) ++counters.clamped_samples;
+  std::array<Fixed, 3> x;
+  for (int c = 0; c < 3; ++c) x[c] = to_fixed(radiance[c], kWideStep);
+  const auto squares = block_squares(x, 1);
+  for (int c = 0; c < 4; ++c) sums_.squares[c] += squares[c];
+  for (int c = 0; c < 3; ++c) {
+    sums_.radiance[c] += x[c];
+    sums_.normal[c] += to_narrow(sample.normal[c]);
+    sums_.albedo[c] += to_narrow(sample.albedo[c]);
+  }
+  sums_.alpha += to_narrow(sample.alpha);
+  if (hit) {
+    sums_.depth += to_fixed(std::min(sample.depth, kRadianceLimit), kWideStep);
+    ++sums_.hits;
+  }
+  ++sums_.count;
+  sums_.blocks = 1;
+  return true;
+}
+
+Film::Film(int width, int height)
+    : width_(width), height_(height), pixels_(static_cast<std::size_t>(width) * height) {}
+
+void Film::add(std::size_t index, const PixelBlock& block, bool continues) {
+  PixelSums& to = pixels_[index];
+  if (!continues || to.blocks == 0) return add_other_blocks(to, block.sums_);
+  if (to.blocks != 1) throw std::logic_error("only a pixel's first block can be continued");
+  for (int c = 0; c < 4; ++c) to.squares[c] += block.sums_.squares[c];
+  add_all_but_squares(to, block.sums_);
+}
+
+void Film::add(const Film& other) {
+  if (other.width_ != width_ || other.height_ != height_)
+    throw std::invalid_argument("merge: results of different sizes cannot be merged");
+  for (std::size_t i = 0; i < pixels_.size(); ++i) add_other_blocks(pixels_[i], other.pixels_[i]);
+}
+
+namespace {
+
+// One pass: `value(pixel, channel)` for every pixel.
+template <int channels, class Value>
+std::vector<float> make_pass(const std::vector<PixelSums>& pixels, Value value) {
+  std::vector<float> pass(pixels.size() * channels);
+  for (std::size_t i = 0; i < pixels.size(); ++i)
+    for (int c = 0; c < channels; ++c) pass[i * channels + c] = static_cast<float>(value(pixels[i], c));
+  return pass;
+}
+
+double per_sample(double sum, std::uint32_t n) { return n ? sum / n : 0; }
+
+}  // namespace
+
+std::vector<float> Film::combined() const {
+  return make_pass<4>(pixels_, [](const PixelSums& p, int c) {
+    return per_sample(c < 3 ? wide(p.radiance[c]) : narrow(p.alpha), p.count);
+  });
+}
+std::vector<float> Film::depth() const {
+  return make_pass<1>(pixels_, [](const PixelSums& p, int) { return p.hits ? wide(p.depth) / p.hits : kInfinity; });
+}
+std::vector<float> Film::normal() const {
+  return make_pass<3>(pixels_, [](const PixelSums& p, int c) { return per_sample(narrow(p.normal[c]), p.count); });
+}
+std::vector<float> Film::albedo() const {
+  return make_pass<3>(pixels_, [](const PixelSums& p, int c) { return per_sample(narrow(p.albedo[c]), p.count); });
+}
+std::vector<float> Film::variance() const {
+  return make_pass<3>(pixels_, [](const PixelSums& p, int c) { return variance_of_mean(p, c); });
+}
+std::vector<float> Film::sample_count() const {
+  return make_pass<1>(pixels_, [](const PixelSums& p, int) { return p.count; });
+}
+
+double Film::estimated_error() const {
+  double sum = 0;
+  for (const PixelSums& p : pixels_) {
+    const double variance = variance_of_mean(p, 3);
+    if (variance == kInfinity) return kInfinity;
+    const double mean =
+        luminance({wide(p.radiance[0]), wide(p.radiance[1]), wide(p.radiance[2])}) / p.count;
+    sum += variance / (mean * mean + 0.01);
+  }
+  return sum / static_cast<double>(pixels_.size());
+}
+
+double Film::mean_sample_count() const {
+  double sum = 0;
+  for (const PixelSums& p : pixels_) sum += p.count;
+  return sum / static_cast<double>(pixels_.size());
+}
+
+}  // namespace gpis
