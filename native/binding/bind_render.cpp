@@ -1,9 +1,9 @@
 #include <pybind11/stl.h>
 #include <pybind11/numpy.h>
 
+#include "binding/arguments.h"
 #include "binding/bind_film.h"
 #include "binding/bindings.h"
-#include "binding/description_reader.h"
 #include "binding/reader.h"
 #include "binding/result_file.h"
 #include "render/pixel_points.h"
@@ -35,7 +35,7 @@ double positive(const py::object& value, const char* name, const std::string& ta
 // The scene itself, or one whose processes all have another memory.
 std::shared_ptr<const Scene> with_memory(const std::shared_ptr<const Scene>& scene, const py::object& memory) {
   if (memory.is_none()) return scene;
-  const Memory wanted = read_memory(memory, "memory");
+  const Memory wanted = memory_argument(to_text(memory, "memory"), "memory");
   SceneDescription description = scene->description();
   bool same = true;
   for (ObjectDescription& object : description.objects)

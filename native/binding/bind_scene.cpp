@@ -26,7 +26,8 @@ world: color (0, 0, 0) | image (H, W, 3) equirectangular, row 0 at the bottom, w
     strength 1
 lights: a list of dicts: type "point" | "spot" | "sun" | "area"; name; matrix (shines along -z); color (1, 1, 1);
     power in W, of a sun its irradiance in W/m² | radiance (3,) of an area light; radius 0 (point, spot);
-    angle, of a sun's disk (0) or of a spot's whole cone, in radians; blend 0 (spot); size (2,), shape "rectangle" | "ellipse" (area)
+    angle, of a sun's disk (0) or of a spot's whole cone, in radians; blend 0 (spot); size (2,), shape "rectangle" | "ellipse" (area);
+    visible_to_camera False (reflections show lights in any case)
 materials: {name: dict}: type "lambert" | "mirror" | "conductor" | "principled"; color (.8, .8, .8), at most 1;
     roughness .5 (conductor, principled); metallic 0 (principled)
 meshes: {name: dict}: vertices (N, 3); triangles (M, 3) integers; normals (N, 3) per vertex or (M, 3, 3) per corner, none: flat;

@@ -7,10 +7,8 @@
 
 namespace gpis {
 
+// Reads structure: keys, types, shapes, names. Whether the values make sense is checked by Scene, for scenes from anywhere.
 // Throws std::invalid_argument with the path of the value and a sentence.
 SceneDescription read_description(const pybind11::handle& dict);
-
-// "none", "renewal", "renewal+" in the order of Memory.
-Memory read_memory(const pybind11::handle& value, const std::string& path);
 
 }  // namespace gpis

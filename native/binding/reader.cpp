@@ -152,13 +152,6 @@ py::object Reader::required(const char* key) {
 
 double Reader::number(const char* key) { return to_number(required(key), path_of(key)); }
 
-double Reader::number(const char* key, double otherwise, double min, double max, const char* takes) {
-  if (!has(key)) return otherwise;
-  const double v = number(key);
-  if (!(v >= min && v <= max)) refuse(path_of(key), "takes " + std::string(takes) + ", got " + shown(dict_[key]));
-  return v;
-}
-
 bool Reader::flag(const char* key, bool otherwise) {
   if (!has(key)) return otherwise;
   const py::object value = dict_[key];
@@ -180,9 +173,7 @@ int Reader::choice(const char* key, const std::vector<const char*>& choices) {
 
 Color Reader::color(const char* key) {
   const DoubleArray v = to_numbers(required(key), path_of(key), {3});
-  const Color c{v.at(0), v.at(1), v.at(2)};
-  if (std::min({c.x, c.y, c.z}) < 0) refuse(path_of(key), "takes three numbers that are not negative, got " + std::string(py::str(v)));
-  return c;
+  return {v.at(0), v.at(1), v.at(2)};
 }
 
 void Reader::finish(const std::string& what) {

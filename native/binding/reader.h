@@ -45,8 +45,6 @@ class Reader {
 
   double number(const char* key);
   double number(const char* key, double otherwise) { return has(key) ? number(key) : otherwise; }
-  // A number in [min, max]; `takes` says so in words.
-  double number(const char* key, double otherwise, double min, double max, const char* takes);
   bool flag(const char* key, bool otherwise);
   std::string text(const char* key, const std::string& otherwise);
   // The index of the value in `choices`.
@@ -54,7 +52,7 @@ class Reader {
   int choice(const char* key, const std::vector<const char*>& choices, int otherwise) {
     return has(key) ? choice(key, choices) : otherwise;
   }
-  Color color(const char* key);  // non-negative
+  Color color(const char* key);
   Affine affine(const char* key) { return has(key) ? to_affine(required(key), path_of(key)) : Affine{}; }
 
   // Refuses keys that nobody asked for. `what` names the thing in the message ("a sun light").

@@ -1,5 +1,6 @@
 #include "binding/result_file.h"
 
+#include "binding/arguments.h"
 #include "binding/bind_film.h"
 #include "binding/reader.h"
 #include "core/errors.h"
@@ -9,14 +10,6 @@ namespace gpis {
 namespace {
 
 const char* const kFormat = "gpis result 1";
-
-py::dict counters_dict(const Counters& counters) {
-  py::dict d;
-#define X(name, meaning) d[#name] = counters.name;
-  GPIS_COUNTERS(X)
-#undef X
-  return d;
-}
 
 py::list ranges_list(const RenderResult& result) {
   py::list ranges;

@@ -1,28 +1,14 @@
 #include "scene/camera.h"
 
-#include <stdexcept>
-
 namespace gpis {
-
-namespace {
-
-Vec3 axis(const Affine& matrix, const Vec3& direction) {
-  const Vec3 v = matrix.vector(direction);
-  const double l = length(v);
-  if (!(l > 0))
-    throw std::invalid_argument("camera.matrix: an axis has length zero; give a matrix that can be inverted");
-  return v / l;
-}
-
-}  // namespace
 
 Camera::Camera(const CameraDescription& description, int width, int height)
     : description_(description),
       image_width_(width),
       image_height_(height),
-      right_(axis(description.matrix, {1, 0, 0})),
-      up_(axis(description.matrix, {0, 1, 0})),
-      back_(axis(description.matrix, {0, 0, 1})),
+      right_(normalize(description.matrix.vector({1, 0, 0}))),
+      up_(normalize(description.matrix.vector({0, 1, 0}))),
+      back_(normalize(description.matrix.vector({0, 0, 1}))),
       position_(description.matrix.translation) {
   const bool perspective = description.type == CameraDescription::Type::perspective;
   const double frame = perspective ? 2 * std::tan(description.fov_x / 2) : description.width;

@@ -18,7 +18,7 @@ struct CameraRay {
 
 class Camera {
  public:
-  // `width` and `height` of the image in pixels. Throws std::invalid_argument where an axis of the matrix has length zero.
+  // `width` and `height` of the image in pixels. The description has passed check() (scene/check.h).
   Camera(const CameraDescription& description, int width, int height);
   CameraRay ray(double x, double y) const;
 

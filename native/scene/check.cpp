@@ -56,6 +56,23 @@ void check_settings(const SettingsDescription& s) {
     fail("settings.missed_root is ", s.missed_root,
          "; give a probability between 0 and 1, such as 1e-3.");
   check_at_least(s.clamp, 0, "settings.clamp");
+  check_between(s.filter_width, 1e-3, 100, "settings.filter.width");
+}
+
+void check_camera(const CameraDescription& c) {
+  for (int i = 0; i < 3; ++i) {
+    const Mat3 columns = transpose(c.matrix.linear);
+    if (!is_finite(columns.row[i]) || !(length(columns.row[i]) > 0))
+      fail("camera.matrix has an axis of length zero or numbers that are not finite.");
+  }
+  if (!is_finite(c.matrix.translation)) fail("camera.matrix holds numbers that are not finite.");
+  if (c.type == CameraDescription::Type::perspective && !(c.fov_x > 0 && c.fov_x < kPi))
+    fail("camera.fov_x is ", c.fov_x, "; give an angle between 0 and π radians.");
+  if (c.type == CameraDescription::Type::orthographic && !(c.width > 0 && c.width < kInfinity))
+    fail("camera.width is ", c.width, "; give a positive width in metres.");
+  if (!(c.clip_near >= 0 && c.clip_near < c.clip_far && c.clip_near < kInfinity))
+    fail("camera.clip is (", c.clip_near, ", ", c.clip_far,
+         "); the near distance must not be negative and must be less than the far one.");
 }
 
 void check_world(const WorldDescription& w) {
@@ -153,13 +170,14 @@ void check_object(const SceneDescription& d, const ObjectDescription& o, const E
 
 void check(const SceneDescription& d) {
   check_settings(d.settings);
+  check_camera(d.camera);
   check_world(d.world);
   for (std::size_t i = 0; i < d.lights.size(); ++i)
     check_light(d.lights[i], EntryPath("lights", i, d.lights[i].name));
   for (std::size_t i = 0; i < d.materials.size(); ++i)
-    check_material(d.materials[i], EntryPath("materials", i, d.materials[i].name));
+    check_material(d.materials[i], EntryPath("materials", d.materials[i].name));
   for (std::size_t i = 0; i < d.meshes.size(); ++i)
-    check_mesh(d.meshes[i], EntryPath("meshes", i, d.meshes[i].name));
+    check_mesh(d.meshes[i], EntryPath("meshes", d.meshes[i].name));
   for (std::size_t i = 0; i < d.objects.size(); ++i)
     check_object(d, d.objects[i], EntryPath("objects", i, d.objects[i].name));
 }
