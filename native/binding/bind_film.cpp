@@ -8,24 +8,31 @@ namespace gpis {
 namespace {
 
 py::array_t<float> pass(const Film& film, std::vector<float> values) {
-  const py::ssize_t channels = static_cast<py::ssize_t>(values.size()) / film.width() / film.height();
+  const py::ssize_t channels =
+      static_cast<py::ssize_t>(values.size()) / film.width() / film.height();
   auto* kept = new std::vector<float>(std::move(values));
   const py::capsule owner(kept, [](void* p) { delete static_cast<std::vector<float>*>(p); });
-  return py::array_t<float>({py::ssize_t{film.height()}, py::ssize_t{film.width()}, channels}, kept->data(), owner);
+  return py::array_t<float>({py::ssize_t{film.height()}, py::ssize_t{film.width()}, channels},
+                            kept->data(), owner);
 }
 
 // Samples of one pixel made elsewhere, as a render would add them.
 void add_samples(Film& film, int x, int y, const py::object& radiance, int first_sample) {
   if (x < 0 || y < 0 || x >= film.width() || y >= film.height())
-    refuse("add", "pixel (" + std::to_string(x) + ", " + std::to_string(y) + ") lies outside the film");
-  if (first_sample < 0 || first_sample % kBlockSamples) refuse("first_sample", "takes a multiple of 16");
+    refuse("add",
+           "pixel (" + std::to_string(x) + ", " + std::to_string(y) + ") lies outside the film");
+  if (first_sample < 0 || first_sample % kBlockSamples)
+    refuse("first_sample", "takes a multiple of 16");
   const auto values = DoubleArray::ensure(radiance);
-  if (!values || values.ndim() != 2 || values.shape(1) != 3) refuse("radiance", "takes numbers of shape (N, 3)");
+  if (!values || values.ndim() != 2 || values.shape(1) != 3)
+    refuse("radiance", "takes numbers of shape (N, 3)");
   Counters counters;
   for (py::ssize_t first = 0; first < values.shape(0); first += kBlockSamples) {
     PixelBlock block;
-    for (py::ssize_t i = first; i < std::min<py::ssize_t>(first + kBlockSamples, values.shape(0)); ++i)
-      block.add({{values.at(i, 0), values.at(i, 1), values.at(i, 2)}, 1, kInfinity, {}, {}}, counters);
+    for (py::ssize_t i = first; i < std::min<py::ssize_t>(first + kBlockSamples, values.shape(0));
+         ++i)
+      block.add({{values.at(i, 0), values.at(i, 1), values.at(i, 2)}, 1, kInfinity, {}, {}},
+                counters);
     film.add(static_cast<std::size_t>(y) * film.width() + x, block);
   }
 }
@@ -76,8 +83,9 @@ Film film_from_arrays(const py::handle& arrays) {
   const auto wide = py::cast<py::array_t<std::uint64_t, py::array::c_style>>(arrays["wide"]);
   const auto narrow = py::cast<py::array_t<std::int64_t, py::array::c_style>>(arrays["narrow"]);
   const auto counts = py::cast<py::array_t<std::uint32_t, py::array::c_style>>(arrays["counts"]);
-  if (wide.ndim() != 4 || wide.shape(2) != 8 || wide.shape(3) != 2 || narrow.ndim() != 3 || narrow.shape(2) != 7 ||
-      counts.ndim() != 3 || counts.shape(2) != 3 || narrow.shape(0) != wide.shape(0) || counts.shape(0) != wide.shape(0) ||
+  if (wide.ndim() != 4 || wide.shape(2) != 8 || wide.shape(3) != 2 || narrow.ndim() != 3 ||
+      narrow.shape(2) != 7 || counts.ndim() != 3 || counts.shape(2) != 3 ||
+      narrow.shape(0) != wide.shape(0) || counts.shape(0) != wide.shape(0) ||
       narrow.shape(1) != wide.shape(1) || counts.shape(1) != wide.shape(1) || wide.size() == 0)
     throw std::invalid_argument("the arrays of its film do not fit together");
   Film film(static_cast<int>(wide.shape(1)), static_cast<int>(wide.shape(0)));
@@ -104,21 +112,26 @@ Film film_from_arrays(const py::handle& arrays) {
 
 void bind_film(py::module_& m) {
   py::class_<Film>(m, "Film",
-                   "The film alone, for samples made elsewhere: exact sums over blocks of 16 samples per pixel.\n"
+                   "The film alone, for samples made elsewhere: exact sums over blocks of 16 "
+                   "samples per pixel.\n"
                    "Film(width, height); row 0 is at the bottom.")
       .def(py::init([](int width, int height) {
              if (width < 1 || height < 1) refuse("Film", "takes a positive width and height");
              return Film(width, height);
            }),
            py::arg("width"), py::arg("height"))
-      .def("add", &add_samples, py::arg("x"), py::arg("y"), py::arg("radiance"), py::arg("first_sample") = 0,
-           "Adds consecutive samples radiance (N, 3) of pixel (x, y), the first of which has a number that is a multiple of 16.\n"
+      .def("add", &add_samples, py::arg("x"), py::arg("y"), py::arg("radiance"),
+           py::arg("first_sample") = 0,
+           "Adds consecutive samples radiance (N, 3) of pixel (x, y), the first of which has a "
+           "number that is a multiple of 16.\n"
            "Samples that are not finite are left out.")
-      .def("merge", [](Film& film, const Film& other) { film.add(other); }, py::arg("other"),
-           "Adds a film of the same size that holds other blocks.")
+      .def(
+          "merge", [](Film& film, const Film& other) { film.add(other); }, py::arg("other"),
+          "Adds a film of the same size that holds other blocks.")
       .def_property_readonly("passes", &film_passes, "Passes as of a render's result.")
-      .def_property_readonly("estimated_error", &Film::estimated_error,
-                             "Mean over pixels of the variance of the mean / (mean² + .01), on luminance.");
+      .def_property_readonly(
+          "estimated_error", &Film::estimated_error,
+          "Mean over pixels of the variance of the mean / (mean² + .01), on luminance.");
 }
 
 }  // namespace gpis

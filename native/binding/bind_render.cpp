@@ -1,5 +1,5 @@
-#include <pybind11/stl.h>
 #include <pybind11/numpy.h>
+#include <pybind11/stl.h>
 
 #include "binding/arguments.h"
 #include "binding/bind_film.h"
@@ -16,9 +16,11 @@ namespace {
 
 constexpr std::int64_t kMostSamples = 1 << 30;
 
-std::int64_t integer(const py::object& value, const char* name, std::int64_t min, std::int64_t max, const std::string& takes) {
+std::int64_t integer(const py::object& value, const char* name, std::int64_t min, std::int64_t max,
+                     const std::string& takes) {
   const bool is_bool = py::isinstance<py::bool_>(value);
-  if (is_bool || !PyIndex_Check(value.ptr())) refuse(name, "takes " + takes + ", got " + shown(value));
+  if (is_bool || !PyIndex_Check(value.ptr()))
+    refuse(name, "takes " + takes + ", got " + shown(value));
   const py::int_ number = py::reinterpret_steal<py::int_>(PyNumber_Index(value.ptr()));
   int overflow = 0;
   const long long v = PyLong_AsLongLongAndOverflow(number.ptr(), &overflow);
@@ -33,7 +35,8 @@ double positive(const py::object& value, const char* name, const std::string& ta
 }
 
 // The scene itself, or one whose processes all have another memory.
-std::shared_ptr<const Scene> with_memory(const std::shared_ptr<const Scene>& scene, const py::object& memory) {
+std::shared_ptr<const Scene> with_memory(const std::shared_ptr<const Scene>& scene,
+                                         const py::object& memory) {
   if (memory.is_none()) return scene;
   const Memory wanted = memory_argument(to_text(memory, "memory"), "memory");
   SceneDescription description = scene->description();
@@ -55,7 +58,8 @@ py::dict progress_stats(const Progress& p, const StoppingRules& rules) {
   stats["samples"] = p.samples;
   stats["estimated_error"] = p.estimated_error;
   stats["remaining"] = p.remaining;
-  stats["error_left"] = rules.noise_threshold ? std::max(0.0, noise - *rules.noise_threshold) : noise;
+  stats["error_left"] =
+      rules.noise_threshold ? std::max(0.0, noise - *rules.noise_threshold) : noise;
   return stats;
 }
 
@@ -74,7 +78,8 @@ void warn_of_bad_samples(const RenderResult& result) {
   if (!result.bad_sample) return;
   const BadSample& bad = *result.bad_sample;
   py::module_::import("logging").attr("getLogger")("gpis").attr("warning")(
-      "%d of the samples were not finite and are left out of the image; the first was sample %d of pixel (%d, %d).",
+      "%d of the samples were not finite and are left out of the image; the first was sample %d of "
+      "pixel (%d, %d).",
       result.counters.nan_samples, bad.sample, bad.x, bad.y);
 }
 
@@ -97,26 +102,37 @@ progress: called as progress(fraction, stats) from the calling thread at most ab
 The Python lock is released while rendering; any number of renders may run at once from several threads.
 Raises ValueError, with the name of the argument or the path in the description.)";
 
-std::shared_ptr<RenderResult> render_scene(const std::shared_ptr<const Scene>& scene, const py::object& width,
-                                           const py::object& height, const py::object& samples,
-                                           const py::object& time_limit, const py::object& noise_threshold,
+std::shared_ptr<RenderResult> render_scene(const std::shared_ptr<const Scene>& scene,
+                                           const py::object& width, const py::object& height,
+                                           const py::object& samples, const py::object& time_limit,
+                                           const py::object& noise_threshold,
                                            const py::object& first_sample, const py::object& seed,
                                            const py::object& threads, const py::object& memory,
                                            const py::object& progress) {
   RenderOptions options;
-  options.width = static_cast<int>(integer(width, "width", 1, 65536, "a number of pixels, 1 to 65536"));
-  options.height = static_cast<int>(integer(height, "height", 1, 65536, "a number of pixels, 1 to 65536"));
-  options.first_sample = static_cast<int>(integer(first_sample, "first_sample", 0, kMostSamples, "a multiple of 16 from 0 to 2^30"));
+  options.width =
+      static_cast<int>(integer(width, "width", 1, 65536, "a number of pixels, 1 to 65536"));
+  options.height =
+      static_cast<int>(integer(height, "height", 1, 65536, "a number of pixels, 1 to 65536"));
+  options.first_sample = static_cast<int>(
+      integer(first_sample, "first_sample", 0, kMostSamples, "a multiple of 16 from 0 to 2^30"));
   if (options.first_sample % kBlockSamples)
-    refuse("first_sample", "takes a multiple of 16 (the film sums blocks of 16 samples), got " + shown(first_sample));
-  if (!samples.is_none()) options.stop.samples = static_cast<int>(integer(samples, "samples", 1, kMostSamples, "an integer from 1 to 2^30"));
-  if (!time_limit.is_none()) options.stop.time_limit = positive(time_limit, "time_limit", "a positive number of seconds");
+    refuse("first_sample", "takes a multiple of 16 (the film sums blocks of 16 samples), got " +
+                               shown(first_sample));
+  if (!samples.is_none())
+    options.stop.samples =
+        static_cast<int>(integer(samples, "samples", 1, kMostSamples, "an integer from 1 to 2^30"));
+  if (!time_limit.is_none())
+    options.stop.time_limit = positive(time_limit, "time_limit", "a positive number of seconds");
   if (!noise_threshold.is_none())
-    options.stop.noise_threshold = positive(noise_threshold, "noise_threshold", "a positive number (relative noise, .05 for instance)");
+    options.stop.noise_threshold = positive(noise_threshold, "noise_threshold",
+                                            "a positive number (relative noise, .05 for instance)");
   if (!options.stop.samples && !options.stop.time_limit && !options.stop.noise_threshold)
     refuse("render", "needs to know when to stop; give samples, time_limit or noise_threshold");
-  options.seed = static_cast<std::uint64_t>(integer(seed, "seed", 0, INT64_MAX, "an integer from 0 to 2^63 - 1"));
-  options.threads = static_cast<int>(integer(threads, "threads", 0, 1024, "a number of threads up to 1024, 0 for all cores"));
+  options.seed = static_cast<std::uint64_t>(
+      integer(seed, "seed", 0, INT64_MAX, "an integer from 0 to 2^63 - 1"));
+  options.threads = static_cast<int>(
+      integer(threads, "threads", 0, 1024, "a number of threads up to 1024, 0 for all cores"));
   if (!progress.is_none() && !PyCallable_Check(progress.ptr()))
     refuse("progress", "takes a function of (fraction, stats), got " + shown(progress));
   const std::shared_ptr<const Scene> rendered = with_memory(scene, memory);
@@ -135,7 +151,8 @@ std::shared_ptr<RenderResult> merge_results(const py::object& results) {
   const auto items = to_items(results, "merge");
   std::vector<const RenderResult*> parts;
   for (const py::object& item : items) {
-    if (!py::isinstance<RenderResult>(item)) refuse("merge", "takes a list of results, got " + shown(item) + " in it");
+    if (!py::isinstance<RenderResult>(item))
+      refuse("merge", "takes a list of results, got " + shown(item) + " in it");
     parts.push_back(py::cast<const RenderResult*>(item));
   }
   const py::gil_scoped_release release;
@@ -146,49 +163,65 @@ std::shared_ptr<RenderResult> merge_results(const py::object& results) {
 
 void bind_render(py::module_& m) {
   // dynamic_attr: passes are made when first asked for and kept.
-  py::class_<RenderResult, std::shared_ptr<RenderResult>>(m, "RenderResult", py::dynamic_attr(),
-                                                          "What render, merge and load_result return.")
+  py::class_<RenderResult, std::shared_ptr<RenderResult>>(
+      m, "RenderResult", py::dynamic_attr(), "What render, merge and load_result return.")
       .def_property_readonly(
           "passes",
           [](const py::object& self) {
-            if (!py::hasattr(self, "_passes")) self.attr("_passes") = film_passes(self.cast<const RenderResult&>().film);
+            if (!py::hasattr(self, "_passes"))
+              self.attr("_passes") = film_passes(self.cast<const RenderResult&>().film);
             return self.attr("_passes");
           },
-          "dict of float32 arrays (H, W, C), row 0 at the bottom: combined (4, premultiplied), depth (1, along the viewing axis,\n"
-          "mean of the samples that hit, inf where none did), normal (3), albedo (3), variance (3, of the pixel's mean; inf where\n"
+          "dict of float32 arrays (H, W, C), row 0 at the bottom: combined (4, premultiplied), "
+          "depth (1, along the viewing axis,\n"
+          "mean of the samples that hit, inf where none did), normal (3), albedo (3), variance (3, "
+          "of the pixel's mean; inf where\n"
           "there are fewer than two samples), sample_count (1).")
-      .def_property_readonly("history", [](const RenderResult& r) { return history_list(r); },
-                             "A dict(seconds, samples, estimated_error) per round: samples is the mean per pixel, estimated_error\n"
-                             "the mean over pixels of (variance of the mean) / (mean² + .01) on luminance (relMSE), inf while a\n"
-                             "pixel has fewer than two samples.")
-      .def_property_readonly("stats", [](const RenderResult& r) { return stats_dict(r); },
-                             "dict: every counter, and width, height, seconds, threads, samples (mean per pixel), estimated_error,\n"
-                             "camera_paths_per_second, rays_per_second, stopped_by (\"samples\", \"time\", \"noise\" or None), cancelled,\n"
-                             "first_nan_sample (None or dict(x, y, sample)), ranges (list of dict(seed, first, count)).")
+      .def_property_readonly(
+          "history", [](const RenderResult& r) { return history_list(r); },
+          "A dict(seconds, samples, estimated_error) per round: samples is the mean per pixel, "
+          "estimated_error\n"
+          "the mean over pixels of (variance of the mean) / (mean² + .01) on luminance (relMSE), "
+          "inf while a\n"
+          "pixel has fewer than two samples.")
+      .def_property_readonly(
+          "stats", [](const RenderResult& r) { return stats_dict(r); },
+          "dict: every counter, and width, height, seconds, threads, samples (mean per pixel), "
+          "estimated_error,\n"
+          "camera_paths_per_second, rays_per_second, stopped_by (\"samples\", \"time\", \"noise\" "
+          "or None), cancelled,\n"
+          "first_nan_sample (None or dict(x, y, sample)), ranges (list of dict(seed, first, "
+          "count)).")
       .def("save", &save_result, py::arg("path"),
-           "Writes the result with its exact sums, so that what load_result returns can still be merged. A numpy .npz file,\n"
+           "Writes the result with its exact sums, so that what load_result returns can still be "
+           "merged. A numpy .npz file,\n"
            "whatever the path is called; replaced only when completely written. Raises OSError.");
-  m.def("render", &render_scene, kRenderDoc, py::arg("scene"), py::arg("width"), py::arg("height"), py::kw_only(),
-        py::arg("samples") = py::none(), py::arg("time_limit") = py::none(), py::arg("noise_threshold") = py::none(),
-        py::arg("first_sample") = 0, py::arg("seed") = 0, py::arg("threads") = 0, py::arg("memory") = py::none(),
-        py::arg("progress") = py::none());
+  m.def("render", &render_scene, kRenderDoc, py::arg("scene"), py::arg("width"), py::arg("height"),
+        py::kw_only(), py::arg("samples") = py::none(), py::arg("time_limit") = py::none(),
+        py::arg("noise_threshold") = py::none(), py::arg("first_sample") = 0, py::arg("seed") = 0,
+        py::arg("threads") = 0, py::arg("memory") = py::none(), py::arg("progress") = py::none());
   m.def("merge", &merge_results, py::arg("results"),
-        "The result of all samples of several results of the same picture: slices (first_sample, samples multiples of 16 except\n"
-        "in the last) merge to the whole render bit by bit. Raises ValueError where sizes differ or samples overlap.");
+        "The result of all samples of several results of the same picture: slices (first_sample, "
+        "samples multiples of 16 except\n"
+        "in the last) merge to the whole render bit by bit. Raises ValueError where sizes differ "
+        "or samples overlap.");
   m.def("load_result", &load_result, py::arg("path"),
-        "A result written by result.save. Raises FileNotFoundError, or ValueError where the file is something else or damaged.");
+        "A result written by result.save. Raises FileNotFoundError, or ValueError where the file "
+        "is something else or damaged.");
   m.def(
       "_next_round",
-      [](int done, double seconds, double error, std::optional<int> samples, std::optional<double> time_limit,
-         std::optional<double> noise_threshold) {
+      [](int done, double seconds, double error, std::optional<int> samples,
+         std::optional<double> time_limit, std::optional<double> noise_threshold) {
         const StoppingRules rules{samples, time_limit, noise_threshold};
         const RenderState state{done, seconds, error};
         static const char* const kStops[] = {"none", "samples", "time", "noise"};
         const Round round = next_round(rules, state);
-        return py::make_tuple(round.count, kStops[static_cast<int>(round.stop)], fraction_done(rules, state, done));
+        return py::make_tuple(round.count, kStops[static_cast<int>(round.stop)],
+                              fraction_done(rules, state, done));
       },
-      py::arg("done"), py::arg("seconds"), py::arg("error"), py::kw_only(), py::arg("samples") = py::none(),
-      py::arg("time_limit") = py::none(), py::arg("noise_threshold") = py::none(),
+      py::arg("done"), py::arg("seconds"), py::arg("error"), py::kw_only(),
+      py::arg("samples") = py::none(), py::arg("time_limit") = py::none(),
+      py::arg("noise_threshold") = py::none(),
       "The scheduler's answer (count, stop, fraction done) for a state of a render. For tests.");
 }
 

@@ -10,7 +10,8 @@ namespace gpis {
 
 namespace {
 
-const char* const kSceneDoc = R"(A scene, planned for rendering: immutable, used by any number of renders at once.
+const char* const kSceneDoc =
+    R"(A scene, planned for rendering: immutable, used by any number of renders at once.
 
 Scene(description) takes a plain dict; numbers may be nested lists or numpy arrays. World units are metres, colours linear RGB
 in (3,), matrices (4, 4) map to world. Keys with a default may be left out; any other key is refused.
@@ -42,14 +43,16 @@ py::dict plan_dict(const Scene& scene) {
   py::dict plan;
   for (const auto& [path, sentence] : scene.plan()) {
     const py::str key(path);
-    plan[key] = plan.contains(key) ? py::str(py::cast<std::string>(plan[key]) + "; " + sentence) : py::str(sentence);
+    plan[key] = plan.contains(key) ? py::str(py::cast<std::string>(plan[key]) + "; " + sentence)
+                                   : py::str(sentence);
   }
   return plan;
 }
 
 py::tuple camera_rays(const Scene& scene, int width, int height, const py::object& points) {
   if (width < 1 || height < 1)
-    refuse("camera_rays", "takes a positive width and height, got " + std::to_string(width) + " x " + std::to_string(height));
+    refuse("camera_rays", "takes a positive width and height, got " + std::to_string(width) +
+                              " x " + std::to_string(height));
   const DoubleArray xy = to_numbers(points, "points", {-1, 2});
   const Camera camera(scene.description().camera, width, height);
   const py::ssize_t n = xy.shape(0);
@@ -71,15 +74,19 @@ void bind_scene(py::module_& m) {
   py::class_<Scene, std::shared_ptr<Scene>>(m, "Scene", kSceneDoc)
       .def(py::init([](const py::object& description) {
              SceneDescription read = read_description(description);
-             py::gil_scoped_release release;  // building acceleration structures takes time and no Python
+             py::gil_scoped_release
+                 release;  // building acceleration structures takes time and no Python
              return std::make_shared<Scene>(std::move(read));
            }),
            py::arg("description"))
       .def("plan", &plan_dict,
-           "What was chosen for this scene and what is left out, as a dict from path (objects[0] …) to a sentence.")
+           "What was chosen for this scene and what is left out, as a dict from path (objects[0] "
+           "…) to a sentence.")
       .def("camera_rays", &camera_rays, py::arg("width"), py::arg("height"), py::arg("points"),
-           "The camera's rays for an image of width x height pixels through points (N, 2), in pixels from the image's lower left\n"
-           "corner. Returns origins (N, 3), on the near clip distance, unit directions (N, 3), and the distance (N,) to the far one.");
+           "The camera's rays for an image of width x height pixels through points (N, 2), in "
+           "pixels from the image's lower left\n"
+           "corner. Returns origins (N, 3), on the near clip distance, unit directions (N, 3), and "
+           "the distance (N,) to the far one.");
 }
 
 }  // namespace gpis

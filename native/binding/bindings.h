@@ -1,5 +1,6 @@
-// One function per folder of native/ (render has two), each in a file of its own, called by module.cpp in an order in which a
-// type is known to Python before another one's signature names it.
+// One function per folder of native/ (render has two), each in a file of its own, called by
+// module.cpp in an order in which a type is known to Python before another one's signature names
+// it.
 #pragma once
 
 #include <pybind11/pybind11.h>

@@ -20,10 +20,12 @@ std::string listed(const Names& names) {
   return s.empty() ? "none" : s;
 }
 
-int resolve(const std::string& name, const Names& names, const std::string& path, const char* kind) {
+int resolve(const std::string& name, const Names& names, const std::string& path,
+            const char* kind) {
   const auto found = names.find(name);
   if (found == names.end())
-    refuse(path, "there is no " + std::string(kind) + " '" + name + "' (the description has " + listed(names) + ")");
+    refuse(path, "there is no " + std::string(kind) + " '" + name + "' (the description has " +
+                     listed(names) + ")");
   return found->second;
 }
 
@@ -37,7 +39,8 @@ SettingsDescription read_settings(const py::handle& value) {
   s.missed_root = r.number("missed_root", s.missed_root);
   if (r.has("filter")) {
     Reader filter(r.required("filter"), "settings.filter");
-    s.filter = static_cast<SettingsDescription::Filter>(filter.choice("type", {"box", "blackman_harris"}));
+    s.filter =
+        static_cast<SettingsDescription::Filter>(filter.choice("type", {"box", "blackman_harris"}));
     s.filter_width = filter.number("width", s.filter_width);
     filter.finish("a filter");
   }
@@ -50,7 +53,8 @@ SettingsDescription read_settings(const py::handle& value) {
 CameraDescription read_camera(const py::handle& value) {
   Reader r(value, "camera");
   CameraDescription c;
-  c.type = static_cast<CameraDescription::Type>(r.choice("type", {"perspective", "orthographic", "equirectangular"}));
+  c.type = static_cast<CameraDescription::Type>(
+      r.choice("type", {"perspective", "orthographic", "equirectangular"}));
   c.matrix = to_affine(r.required("matrix"), "camera.matrix");
   if (c.type == CameraDescription::Type::perspective) {
     c.fov_x = r.number("fov_x");
@@ -64,13 +68,16 @@ CameraDescription read_camera(const py::handle& value) {
   }
   if (r.has("clip")) {
     const auto clip = to_items(r.required("clip"), "camera.clip");
-    if (clip.size() != 2) refuse("camera.clip", "takes two distances (near, far), got " + std::to_string(clip.size()));
+    if (clip.size() != 2)
+      refuse("camera.clip", "takes two distances (near, far), got " + std::to_string(clip.size()));
     c.clip_near = to_number(clip[0], "camera.clip[0]");
     c.clip_far = to_number(clip[1], "camera.clip[1]");  // may be infinite
   }
   r.has("lens");
-  r.unsupported("lens", "depth of field is not supported by this version; give None or leave the key out");
-  static const char* const kNames[] = {"a perspective camera", "an orthographic camera", "an equirectangular camera"};
+  r.unsupported("lens",
+                "depth of field is not supported by this version; give None or leave the key out");
+  static const char* const kNames[] = {"a perspective camera", "an orthographic camera",
+                                       "an equirectangular camera"};
   r.finish(kNames[static_cast<int>(c.type)]);
   return c;
 }
@@ -112,13 +119,17 @@ LightDescription read_light(const py::handle& value, const std::string& path) {
   }
   l.visible_to_camera = r.flag("visible_to_camera", l.visible_to_camera);
   switch (l.type) {
-    case LightDescription::Type::point: l.radius = r.number("radius", 0); break;
+    case LightDescription::Type::point:
+      l.radius = r.number("radius", 0);
+      break;
     case LightDescription::Type::spot:
       l.radius = r.number("radius", 0);
       l.angle = r.number("angle");
       l.blend = r.number("blend", 0);
       break;
-    case LightDescription::Type::sun: l.angle = r.number("angle", 0); break;
+    case LightDescription::Type::sun:
+      l.angle = r.number("angle", 0);
+      break;
     case LightDescription::Type::area: {
       const DoubleArray size = to_numbers(r.required("size"), r.path_of("size"), {2});
       l.size_x = size.at(0);
@@ -127,7 +138,8 @@ LightDescription read_light(const py::handle& value, const std::string& path) {
       break;
     }
   }
-  static const char* const kNames[] = {"a point light", "a spot light", "a sun light", "an area light"};
+  static const char* const kNames[] = {"a point light", "a spot light", "a sun light",
+                                       "an area light"};
   r.finish(kNames[static_cast<int>(l.type)]);
   return l;
 }
@@ -137,12 +149,16 @@ MaterialDescription read_material(const py::handle& value, const std::string& na
   Reader r(value, path);
   const std::string type = to_text(r.required("type"), r.path_of("type"));
   if (type == "dielectric" || type == "mix")
-    refuse(r.path_of("type"), "'" + type + "' is not supported by this version (takes lambert, mirror, conductor, principled)");
+    refuse(r.path_of("type"),
+           "'" + type +
+               "' is not supported by this version (takes lambert, mirror, conductor, principled)");
   MaterialDescription m;
   m.name = name;
-  m.type = static_cast<MaterialDescription::Type>(r.choice("type", {"lambert", "mirror", "conductor", "principled"}));
+  m.type = static_cast<MaterialDescription::Type>(
+      r.choice("type", {"lambert", "mirror", "conductor", "principled"}));
   if (r.has("color")) m.color = r.color("color");
-  if (m.type == MaterialDescription::Type::conductor || m.type == MaterialDescription::Type::principled)
+  if (m.type == MaterialDescription::Type::conductor ||
+      m.type == MaterialDescription::Type::principled)
     m.roughness = r.number("roughness", 0.5);
   if (m.type == MaterialDescription::Type::principled) m.metallic = r.number("metallic", 0);
   r.finish("a " + type + " material");
@@ -160,19 +176,24 @@ MeshDescription read_mesh(const py::handle& value, const std::string& name) {
   const auto count = static_cast<int>(triangles.size() / 3);
   for (const std::int64_t index : triangles)
     if (index < 0 || index > UINT32_MAX)
-      refuse(r.path_of("triangles"), "names vertex " + std::to_string(index) + "; vertices are counted from 0");
+      refuse(r.path_of("triangles"),
+             "names vertex " + std::to_string(index) + "; vertices are counted from 0");
   m.triangles.assign(triangles.begin(), triangles.end());
   if (r.has("normals")) {
     const py::object given = r.required("normals");
     m.normals_per_corner = py::module_::import("numpy").attr("ndim")(given).equal(py::int_(3));
     const DoubleArray normals =
         to_numbers(given, r.path_of("normals"),
-                   m.normals_per_corner ? std::vector<int>{count, 3, 3} : std::vector<int>{static_cast<int>(vertices.shape(0)), 3});
+                   m.normals_per_corner ? std::vector<int>{count, 3, 3}
+                                        : std::vector<int>{static_cast<int>(vertices.shape(0)), 3});
     m.normals.assign(normals.data(), normals.data() + normals.size());
   }
   if (r.has("material_index")) {
-    const auto index = to_integers(r.required("material_index"), r.path_of("material_index"), {count});
-    for (const std::int64_t i : index) m.material_index.push_back(static_cast<std::int32_t>(std::clamp<std::int64_t>(i, -1, INT_MAX)));
+    const auto index =
+        to_integers(r.required("material_index"), r.path_of("material_index"), {count});
+    for (const std::int64_t i : index)
+      m.material_index.push_back(
+          static_cast<std::int32_t>(std::clamp<std::int64_t>(i, -1, INT_MAX)));
   }
   r.has("uvs");
   r.unsupported("uvs", "textured meshes are not supported by this version; leave the key out");
@@ -180,7 +201,8 @@ MeshDescription read_mesh(const py::handle& value, const std::string& name) {
   return m;
 }
 
-ObjectDescription read_object(const py::handle& value, const std::string& path, const Names& meshes, const Names& materials) {
+ObjectDescription read_object(const py::handle& value, const std::string& path, const Names& meshes,
+                              const Names& materials) {
   Reader r(value, path);
   ObjectDescription o;
   o.type = static_cast<ObjectDescription::Type>(r.choice("type", {"mesh", "gpis"}));
@@ -192,7 +214,8 @@ ObjectDescription read_object(const py::handle& value, const std::string& path, 
     o.materials.push_back(resolve(to_text(names[i], item), materials, item, "material"));
   }
   if (o.type == ObjectDescription::Type::mesh) {
-    o.mesh = resolve(to_text(r.required("mesh"), r.path_of("mesh")), meshes, r.path_of("mesh"), "mesh");
+    o.mesh =
+        resolve(to_text(r.required("mesh"), r.path_of("mesh")), meshes, r.path_of("mesh"), "mesh");
     r.finish("a mesh object");
     return o;
   }
@@ -235,12 +258,14 @@ SceneDescription read_description(const py::handle& dict) {
     for (std::size_t i = 0; i < lights.size(); ++i)
       scene.lights.push_back(read_light(lights[i], "lights[" + std::to_string(i) + "]"));
   }
-  const Names materials = read_named(r, "materials", [&](const py::handle& value, const std::string& name) {
-    scene.materials.push_back(read_material(value, name));
-  });
-  const Names meshes = read_named(r, "meshes", [&](const py::handle& value, const std::string& name) {
-    scene.meshes.push_back(read_mesh(value, name));
-  });
+  const Names materials =
+      read_named(r, "materials", [&](const py::handle& value, const std::string& name) {
+        scene.materials.push_back(read_material(value, name));
+      });
+  const Names meshes =
+      read_named(r, "meshes", [&](const py::handle& value, const std::string& name) {
+        scene.meshes.push_back(read_mesh(value, name));
+      });
   if (r.has("objects")) {
     const auto objects = to_items(r.required("objects"), "objects");
     for (std::size_t i = 0; i < objects.size(); ++i)

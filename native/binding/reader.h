@@ -1,5 +1,6 @@
-// Typed reading of a description's dicts. Every value knows its path (`objects[2].matrix`), every refusal says the path, what
-// was there and what it takes. A Reader remembers the keys that were asked for; finish() refuses any other.
+// Typed reading of a description's dicts. Every value knows its path (`objects[2].matrix`), every
+// refusal says the path, what was there and what it takes. A Reader remembers the keys that were
+// asked for; finish() refuses any other.
 #pragma once
 
 #include <pybind11/numpy.h>
@@ -24,8 +25,10 @@ std::string shown(const py::handle& value);
 double to_number(const py::handle& value, const std::string& path);
 std::string to_text(const py::handle& value, const std::string& path);
 // `shape` entries of -1 take any length.
-DoubleArray to_numbers(const py::handle& value, const std::string& path, const std::vector<int>& shape);
-std::vector<std::int64_t> to_integers(const py::handle& value, const std::string& path, const std::vector<int>& shape);
+DoubleArray to_numbers(const py::handle& value, const std::string& path,
+                       const std::vector<int>& shape);
+std::vector<std::int64_t> to_integers(const py::handle& value, const std::string& path,
+                                      const std::vector<int>& shape);
 Affine to_affine(const py::handle& value, const std::string& path);
 Mat3 to_mat3(const py::handle& value, const std::string& path);
 // The items of a list, tuple or array.
@@ -53,7 +56,9 @@ class Reader {
     return has(key) ? choice(key, choices) : otherwise;
   }
   Color color(const char* key);
-  Affine affine(const char* key) { return has(key) ? to_affine(required(key), path_of(key)) : Affine{}; }
+  Affine affine(const char* key) {
+    return has(key) ? to_affine(required(key), path_of(key)) : Affine{};
+  }
 
   // Refuses keys that nobody asked for. `what` names the thing in the message ("a sun light").
   void finish(const std::string& what);

@@ -32,7 +32,9 @@ py::object bad_sample_dict(const RenderResult& result) {
   return d;
 }
 
-py::object text_or_none(const std::string& text) { return text.empty() ? py::object(py::none()) : py::str(text); }
+py::object text_or_none(const std::string& text) {
+  return text.empty() ? py::object(py::none()) : py::str(text);
+}
 
 void read_facts(const py::dict& facts, RenderResult& result) {
   const py::dict counters = facts["counters"];
@@ -44,12 +46,14 @@ void read_facts(const py::dict& facts, RenderResult& result) {
     result.history.push_back({py::cast<double>(row["seconds"]), py::cast<double>(row["samples"]),
                               py::cast<double>(row["estimated_error"])});
   for (const py::handle row : facts["ranges"])
-    result.ranges.push_back({py::cast<std::uint64_t>(row["seed"]), py::cast<std::int64_t>(row["first"]),
+    result.ranges.push_back({py::cast<std::uint64_t>(row["seed"]),
+                             py::cast<std::int64_t>(row["first"]),
                              py::cast<std::int64_t>(row["count"])});
   const py::object bad = facts["first_nan_sample"];
   if (!bad.is_none())
-    result.bad_sample = BadSample{py::cast<std::int64_t>(bad["sample"]), py::cast<std::int64_t>(bad["x"]),
-                                  py::cast<std::int64_t>(bad["y"])};
+    result.bad_sample =
+        BadSample{py::cast<std::int64_t>(bad["sample"]), py::cast<std::int64_t>(bad["x"]),
+                  py::cast<std::int64_t>(bad["y"])};
   result.seconds = py::cast<double>(facts["seconds"]);
   result.threads = py::cast<int>(facts["threads"]);
   result.cancelled = py::cast<bool>(facts["cancelled"]);
@@ -73,14 +77,16 @@ py::list history_list(const RenderResult& result) {
 
 py::dict stats_dict(const RenderResult& r) {
   py::dict stats = counters_dict(r.counters);
-  const double rays = static_cast<double>(r.counters.mesh_rays + r.counters.line_segments + r.counters.line_skipped);
+  const double rays = static_cast<double>(r.counters.mesh_rays + r.counters.line_segments +
+                                          r.counters.line_skipped);
   stats["width"] = r.film.width();
   stats["height"] = r.film.height();
   stats["seconds"] = r.seconds;
   stats["threads"] = r.threads;
   stats["samples"] = r.film.mean_sample_count();
   stats["estimated_error"] = r.film.estimated_error();
-  stats["camera_paths_per_second"] = r.seconds > 0 ? static_cast<double>(r.counters.camera_paths) / r.seconds : 0;
+  stats["camera_paths_per_second"] =
+      r.seconds > 0 ? static_cast<double>(r.counters.camera_paths) / r.seconds : 0;
   stats["rays_per_second"] = r.seconds > 0 ? rays / r.seconds : 0;
   stats["stopped_by"] = text_or_none(r.stopped_by);
   stats["cancelled"] = r.cancelled;
@@ -124,16 +130,20 @@ std::shared_ptr<RenderResult> load_result(const py::object& path) {
     throw FileNotFound("load_result: there is no file '" + name + "'");
   auto result = std::make_shared<RenderResult>();
   try {
-    const py::object archive = py::module_::import("numpy").attr("load")(path, py::arg("allow_pickle") = false);
-    if (!py::str(archive["format"]).equal(py::str(kFormat))) throw std::invalid_argument("it is of another format");
+    const py::object archive =
+        py::module_::import("numpy").attr("load")(path, py::arg("allow_pickle") = false);
+    if (!py::str(archive["format"]).equal(py::str(kFormat)))
+      throw std::invalid_argument("it is of another format");
     read_facts(py::module_::import("json").attr("loads")(py::str(archive["facts"])), *result);
     result->film = film_from_arrays(archive);
     archive.attr("close")();
   } catch (const py::error_already_set& e) {
     if (e.matches(PyExc_KeyboardInterrupt) || e.matches(PyExc_MemoryError)) throw;
-    refuse("load_result", "'" + name + "' is not a result that save wrote, or it is damaged (" + std::string(py::str(e.value())) + ")");
+    refuse("load_result", "'" + name + "' is not a result that save wrote, or it is damaged (" +
+                              std::string(py::str(e.value())) + ")");
   } catch (const std::exception& e) {
-    refuse("load_result", "'" + name + "' is not a result that save wrote, or it is damaged (" + e.what() + ")");
+    refuse("load_result",
+           "'" + name + "' is not a result that save wrote, or it is damaged (" + e.what() + ")");
   }
   return result;
 }

@@ -1,5 +1,5 @@
-// A render's result as Python dicts, and in a file: a numpy .npz archive (zip, so that damage is noticed) of the film's exact
-// sums and one JSON text for the rest.
+// A render's result as Python dicts, and in a file: a numpy .npz archive (zip, so that damage is
+// noticed) of the film's exact sums and one JSON text for the rest.
 #pragma once
 
 #include <pybind11/pybind11.h>

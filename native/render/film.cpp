@@ -8,15 +8,22 @@ namespace gpis {
 namespace {
 
 constexpr double kWideStep = 0x1p-64, kSquareStep = 0x1p-56, kNarrowStep = 0x1p-32;
-// Alpha, normal and albedo: beyond this a sum of 2^16 samples could overflow. Materials keep them far below.
+// Alpha, normal and albedo: beyond this a sum of 2^16 samples could overflow. Materials keep them
+// far below.
 constexpr double kFeatureLimit = 0x1p15;
 
-Fixed to_fixed(double v, double step) { return static_cast<Fixed>(v / step); }
+Fixed to_fixed(double v, double step) {
+  return static_cast<Fixed>(v / step);
+}
 std::int64_t to_narrow(double v) {
   return static_cast<std::int64_t>(std::clamp(v, -kFeatureLimit, kFeatureLimit) / kNarrowStep);
 }
-double wide(Fixed v) { return static_cast<double>(v) * kWideStep; }
-double narrow(std::int64_t v) { return static_cast<double>(v) * kNarrowStep; }
+double wide(Fixed v) {
+  return static_cast<double>(v) * kWideStep;
+}
+double narrow(std::int64_t v) {
+  return static_cast<double>(v) * kNarrowStep;
+}
 
 // S² / n of a sum of n samples: the block's term of Q.
 std::array<Fixed, 4> block_squares(const std::array<Fixed, 3>& radiance, std::uint32_t n) {
@@ -59,10 +66,12 @@ void add_other_blocks(PixelSums& to, const PixelSums& from) {
 double variance_of_mean(const PixelSums& p, int c) {
   const double n = p.count, parts = p.blocks == 1 ? n : p.blocks;
   if (!(parts >= 2)) return kInfinity;
-  const double s = c < 3 ? wide(p.radiance[c])
-                         : luminance({wide(p.radiance[0]), wide(p.radiance[1]), wide(p.radiance[2])});
+  const double s = c < 3
+                       ? wide(p.radiance[c])
+                       : luminance({wide(p.radiance[0]), wide(p.radiance[1]), wide(p.radiance[2])});
   const double q = static_cast<double>(p.squares[c]) * kSquareStep;
-  return std::max(0.0, (q - s * s / n) / ((parts - 1) * n));  // rounding may leave less than nothing
+  return std::max(0.0,
+                  (q - s * s / n) / ((parts - 1) * n));  // rounding may leave less than nothing
 }
 
 }  // namespace
@@ -75,7 +84,8 @@ bool PixelBlock::add(const FilmSample& sample, Counters& counters) {
     return false;
   }
   Color radiance = sample.radiance;
-  for (int c = 0; c < 3; ++c) radiance[c] = std::clamp(radiance[c], -kRadianceLimit, kRadianceLimit);
+  for (int c = 0; c < 3; ++c)
+    radiance[c] = std::clamp(radiance[c], -kRadianceLimit, kRadianceLimit);
   if (length(radiance - sample.radiance) > 0) ++counters.clamped_samples;
   std::array<Fixed, 3> x;
   for (int c = 0; c < 3; ++c) x[c] = to_fixed(radiance[c], kWideStep);
@@ -120,11 +130,14 @@ template <int channels, class Value>
 std::vector<float> make_pass(const std::vector<PixelSums>& pixels, Value value) {
   std::vector<float> pass(pixels.size() * channels);
   for (std::size_t i = 0; i < pixels.size(); ++i)
-    for (int c = 0; c < channels; ++c) pass[i * channels + c] = static_cast<float>(value(pixels[i], c));
+    for (int c = 0; c < channels; ++c)
+      pass[i * channels + c] = static_cast<float>(value(pixels[i], c));
   return pass;
 }
 
-double per_sample(double sum, std::uint32_t n) { return n ? sum / n : 0; }
+double per_sample(double sum, std::uint32_t n) {
+  return n ? sum / n : 0;
+}
 
 }  // namespace
 
@@ -134,13 +147,16 @@ std::vector<float> Film::combined() const {
   });
 }
 std::vector<float> Film::depth() const {
-  return make_pass<1>(pixels_, [](const PixelSums& p, int) { return p.hits ? wide(p.depth) / p.hits : kInfinity; });
+  return make_pass<1>(
+      pixels_, [](const PixelSums& p, int) { return p.hits ? wide(p.depth) / p.hits : kInfinity; });
 }
 std::vector<float> Film::normal() const {
-  return make_pass<3>(pixels_, [](const PixelSums& p, int c) { return per_sample(narrow(p.normal[c]), p.count); });
+  return make_pass<3>(
+      pixels_, [](const PixelSums& p, int c) { return per_sample(narrow(p.normal[c]), p.count); });
 }
 std::vector<float> Film::albedo() const {
-  return make_pass<3>(pixels_, [](const PixelSums& p, int c) { return per_sample(narrow(p.albedo[c]), p.count); });
+  return make_pass<3>(
+      pixels_, [](const PixelSums& p, int c) { return per_sample(narrow(p.albedo[c]), p.count); });
 }
 std::vector<float> Film::variance() const {
   return make_pass<3>(pixels_, [](const PixelSums& p, int c) { return variance_of_mean(p, c); });

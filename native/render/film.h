@@ -1,10 +1,13 @@
-// The film: per pixel, exact sums over blocks of samples, and the passes and error estimate made of them.
+// The film: per pixel, exact sums over blocks of samples, and the passes and error estimate made of
+// them.
 //
-// Sums are integers (fixed point), so they do not depend on the order of addition: an image is the same bit by bit whatever the
-// threads, and merged slices equal the whole. The variance of a pixel's mean comes from the spread of its block sums (a block's
-// samples may depend on each other, blocks do not): with sums S_b of n_b samples, S = Σ S_b, n = Σ n_b, Q = Σ S_b² / n_b, B blocks,
+// Sums are integers (fixed point), so they do not depend on the order of addition: an image is the
+// same bit by bit whatever the threads, and merged slices equal the whole. The variance of a
+// pixel's mean comes from the spread of its block sums (a block's samples may depend on each other,
+// blocks do not): with sums S_b of n_b samples, S = Σ S_b, n = Σ n_b, Q = Σ S_b² / n_b, B blocks,
 //   Var(S/n) = (Q - S²/n) / ((B - 1) n).
-// A pixel with one block only is treated as if each of its samples were a block: Q = Σ x². The second block turns Q over.
+// A pixel with one block only is treated as if each of its samples were a block: Q = Σ x². The
+// second block turns Q over.
 #pragma once
 
 #include <array>
@@ -17,9 +20,11 @@
 
 namespace gpis {
 
-// Fixed point, 128 bits. Radiance and depth: steps of 2^-64, up to 9e18; squares: steps of 2^-56, up to 2e21.
+// Fixed point, 128 bits. Radiance and depth: steps of 2^-64, up to 9e18; squares: steps of 2^-56,
+// up to 2e21.
 using Fixed = __int128;
-// Samples are limited to this radiance so that sums cannot overflow before 2^33 of them (counted as clamped).
+// Samples are limited to this radiance so that sums cannot overflow before 2^33 of them (counted as
+// clamped).
 inline constexpr double kRadianceLimit = 0x1p30;
 
 // The sums of one pixel over the samples it holds.
@@ -44,7 +49,8 @@ struct FilmSample {
   Color albedo;
 };
 
-// The samples of one pixel that belong to one block (or to the part of it that is rendered in one go).
+// The samples of one pixel that belong to one block (or to the part of it that is rendered in one
+// go).
 class PixelBlock {
  public:
   // False where the sample is not finite: counted and left out.
@@ -64,20 +70,23 @@ class Film {
   std::vector<PixelSums>& pixels() { return pixels_; }
   const std::vector<PixelSums>& pixels() const { return pixels_; }
 
-  // Adds a block to pixel `index` (row 0 at the bottom). `continues`: these are further samples of the pixel's first block.
+  // Adds a block to pixel `index` (row 0 at the bottom). `continues`: these are further samples of
+  // the pixel's first block.
   void add(std::size_t index, const PixelBlock& block, bool continues = false);
   // Adds a film of the same size that holds other blocks.
   void add(const Film& other);
 
   // Passes of `channels` floats per pixel, rows from the bottom.
-  std::vector<float> combined() const;      // 4, premultiplied
-  std::vector<float> depth() const;         // 1, mean over the samples that hit, infinite where none did
-  std::vector<float> normal() const;        // 3
-  std::vector<float> albedo() const;        // 3
-  std::vector<float> variance() const;      // 3, of the pixel's mean; infinite with fewer than two samples
+  std::vector<float> combined() const;  // 4, premultiplied
+  std::vector<float> depth() const;   // 1, mean over the samples that hit, infinite where none did
+  std::vector<float> normal() const;  // 3
+  std::vector<float> albedo() const;  // 3
+  std::vector<float> variance()
+      const;  // 3, of the pixel's mean; infinite with fewer than two samples
   std::vector<float> sample_count() const;  // 1
 
-  // Mean over pixels of Var(mean) / (mean² + 0.01) on luminance; infinite while a pixel has fewer than two samples.
+  // Mean over pixels of Var(mean) / (mean² + 0.01) on luminance; infinite while a pixel has fewer
+  // than two samples.
   double estimated_error() const;
   double mean_sample_count() const;
 

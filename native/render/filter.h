@@ -1,5 +1,6 @@
-// Pixel filters, by importance sampling: a camera sample is moved about the pixel's centre with the filter as density, so all
-// samples weigh the same and belong to one pixel only (Ernst, Stamminger, Greiner 2006, "Filter importance sampling").
+// Pixel filters, by importance sampling: a camera sample is moved about the pixel's centre with the
+// filter as density, so all samples weigh the same and belong to one pixel only (Ernst, Stamminger,
+// Greiner 2006, "Filter importance sampling").
 #pragma once
 
 #include <array>
@@ -12,7 +13,8 @@ class PixelFilter {
  public:
   PixelFilter(SettingsDescription::Filter type, double width);
 
-  // Uniform u in [0, 1) to an offset from the pixel's centre, in pixels, within half the filter's width.
+  // Uniform u in [0, 1) to an offset from the pixel's centre, in pixels, within half the filter's
+  // width.
   double offset(double u) const;
 
  private:

@@ -8,8 +8,8 @@ namespace gpis {
 namespace {
 
 std::string describe(const SampleRange& r) {
-  return "samples " + std::to_string(r.first) + ".." + std::to_string(r.first + r.count - 1) + " of seed " +
-         std::to_string(r.seed);
+  return "samples " + std::to_string(r.first) + ".." + std::to_string(r.first + r.count - 1) +
+         " of seed " + std::to_string(r.seed);
 }
 
 void add_ranges(std::vector<SampleRange>& to, const std::vector<SampleRange>& from) {
@@ -41,7 +41,8 @@ RenderResult merge(const std::vector<const RenderResult*>& results) {
     merged.history = results[0]->history;
     merged.stopped_by = results[0]->stopped_by;
   } else {
-    merged.history = {{merged.seconds, merged.film.mean_sample_count(), merged.film.estimated_error()}};
+    merged.history = {
+        {merged.seconds, merged.film.mean_sample_count(), merged.film.estimated_error()}};
   }
   return merged;
 }

@@ -1,4 +1,5 @@
-// What a render leaves: its film, how it went, and which samples it holds. Results of other samples of the same picture merge.
+// What a render leaves: its film, how it went, and which samples it holds. Results of other samples
+// of the same picture merge.
 #pragma once
 
 #include <cstdint>
@@ -38,7 +39,8 @@ struct RenderResult {
   std::string stopped_by;  // "samples", "time" or "noise"; empty if cancelled or merged
 };
 
-// The result of all their samples. Throws std::invalid_argument where sizes differ or samples would be counted twice.
+// The result of all their samples. Throws std::invalid_argument where sizes differ or samples would
+// be counted twice.
 RenderResult merge(const std::vector<const RenderResult*>& results);
 
 }  // namespace gpis

@@ -24,7 +24,8 @@ Round next_round(const StoppingRules& rules, const RenderState& state) {
   const int done = state.samples;
   const int limit = rules.samples.value_or(std::numeric_limits<int>::max());
   if (done >= limit) return {0, Round::Stop::samples};
-  if (done > 0 && rules.time_limit && state.seconds >= *rules.time_limit) return {0, Round::Stop::time};
+  if (done > 0 && rules.time_limit && state.seconds >= *rules.time_limit)
+    return {0, Round::Stop::time};
   if (done >= kMinimumForNoise && rules.noise_threshold &&
       state.estimated_error <= *rules.noise_threshold * *rules.noise_threshold)
     return {0, Round::Stop::noise};
@@ -33,7 +34,8 @@ Round next_round(const StoppingRules& rules, const RenderState& state) {
   if (done < kBlockSamples) return {std::min(kBlockSamples - done, limit - done)};
   int count = std::max(done / 4, 1);
   if (rules.noise_threshold && std::isfinite(state.estimated_error)) {
-    const double needed = std::max<double>(samples_for_noise(*rules.noise_threshold, state), kMinimumForNoise);
+    const double needed =
+        std::max<double>(samples_for_noise(*rules.noise_threshold, state), kMinimumForNoise);
     count = static_cast<int>(std::clamp<double>(needed - done, 1, count));
   }
   count = (count + kBlockSamples - 1) / kBlockSamples * kBlockSamples;
@@ -45,7 +47,8 @@ double fraction_done(const StoppingRules& rules, const RenderState& state, doubl
   if (rules.samples) fraction = std::max(fraction, paths_done / *rules.samples);
   if (rules.time_limit) fraction = std::max(fraction, state.seconds / *rules.time_limit);
   if (rules.noise_threshold && state.samples > 0 && std::isfinite(state.estimated_error)) {
-    const double needed = std::max<double>(samples_for_noise(*rules.noise_threshold, state), kMinimumForNoise);
+    const double needed =
+        std::max<double>(samples_for_noise(*rules.noise_threshold, state), kMinimumForNoise);
     fraction = std::max(fraction, paths_done / needed);
   }
   return std::min(fraction, 1.0);

@@ -27,13 +27,14 @@ struct Round {
   Stop stop = Stop::none;
 };
 
-// Rounds hold whole blocks of 16 samples and add a quarter to those there are, so that the error is looked at on a logarithmic
-// scale. Exceptions: with a time limit the very first round is a single sample (every pixel gets one, whatever the limit) and the
-// second the rest of its block; `samples` ends the last round; a noise threshold ends a round where it should be reached.
+// Rounds hold whole blocks of 16 samples and add a quarter to those there are, so that the error is
+// looked at on a logarithmic scale. Exceptions: with a time limit the very first round is a single
+// sample (every pixel gets one, whatever the limit) and the second the rest of its block; `samples`
+// ends the last round; a noise threshold ends a round where it should be reached.
 Round next_round(const StoppingRules& rules, const RenderState& state);
 
-// Part of the whole render that is done, in [0, 1], by the rule that is nearest to its end. `paths_done` counts samples of the
-// round in hand too, per pixel.
+// Part of the whole render that is done, in [0, 1], by the rule that is nearest to its end.
+// `paths_done` counts samples of the round in hand too, per pixel.
 double fraction_done(const StoppingRules& rules, const RenderState& state, double paths_done);
 
 }  // namespace gpis

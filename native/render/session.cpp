@@ -70,7 +70,8 @@ class Session {
   double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
 
   void start_threads() {
-    int n = options_.threads > 0 ? options_.threads : static_cast<int>(std::thread::hardware_concurrency());
+    int n = options_.threads > 0 ? options_.threads
+                                 : static_cast<int>(std::thread::hardware_concurrency());
     result_.threads = n = std::max(n, 1);
     workers_.resize(n);
     for (Worker& w : workers_) w.thread = std::thread([this, &w] { work(w); });
@@ -87,7 +88,8 @@ class Session {
       if (w.thread.joinable()) w.thread.join();
   }
 
-  // --- the calling thread -------------------------------------------------------------------------------------------------
+  // --- the calling thread
+  // -------------------------------------------------------------------------------------------------
   void run_rounds(const ProgressCallback& progress) {
     RenderState state{0, 0, kInfinity};
     for (;;) {
@@ -101,13 +103,16 @@ class Session {
       state.samples += round.count;
       state.seconds = seconds();
       state.estimated_error = result_.film.estimated_error();
-      result_.history.push_back({state.seconds, result_.film.mean_sample_count(), state.estimated_error});
+      result_.history.push_back(
+          {state.seconds, result_.film.mean_sample_count(), state.estimated_error});
       if (time_is_up_) return stop(Round::Stop::time);
     }
   }
 
   void stop(Round::Stop reason) {
-    result_.stopped_by = reason == Round::Stop::samples ? "samples" : reason == Round::Stop::time ? "time" : "noise";
+    result_.stopped_by = reason == Round::Stop::samples ? "samples"
+                         : reason == Round::Stop::time  ? "time"
+                                                        : "noise";
   }
 
   // `count` more samples of every pixel; false if cancelled or failed on the way.
@@ -118,8 +123,10 @@ class Session {
     items_ = static_cast<std::int64_t>((count + kBlockSamples - 1) / kBlockSamples) * tiles_;
     next_item_ = 0;
     busy_ = static_cast<int>(workers_.size());
-    if (state.samples > 0 && options_.stop.time_limit)  // every pixel gets its first sample, whatever the limit
-      deadline_ = start_ + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(*options_.stop.time_limit));
+    if (state.samples > 0 &&
+        options_.stop.time_limit)  // every pixel gets its first sample, whatever the limit
+      deadline_ = start_ + std::chrono::duration_cast<Clock::duration>(
+                               std::chrono::duration<double>(*options_.stop.time_limit));
     ++round_number_;
     round_started_.notify_all();
     for (bool finished = false; !finished;) {
@@ -138,9 +145,12 @@ class Session {
     now.seconds = seconds();
     Progress p;
     p.seconds = now.seconds;
-    p.samples = static_cast<double>(paths_done_) / (static_cast<double>(options_.width) * options_.height);
+    p.samples =
+        static_cast<double>(paths_done_) / (static_cast<double>(options_.width) * options_.height);
     p.estimated_error = state.estimated_error;
-    fraction_ = std::max(fraction_, fraction_done(options_.stop, now, p.samples));  // an estimate may move back, a bar not
+    fraction_ = std::max(
+        fraction_,
+        fraction_done(options_.stop, now, p.samples));  // an estimate may move back, a bar not
     p.fraction = fraction_;
     if (fraction_ > 0) p.remaining = now.seconds * (1 - fraction_) / fraction_;
     return progress(p);
@@ -149,7 +159,8 @@ class Session {
   void finish() {
     for (const Worker& w : workers_) {
       result_.counters.add(w.counters);
-      if (w.bad_sample && (!result_.bad_sample || earlier(*w.bad_sample, *result_.bad_sample))) result_.bad_sample = w.bad_sample;
+      if (w.bad_sample && (!result_.bad_sample || earlier(*w.bad_sample, *result_.bad_sample)))
+        result_.bad_sample = w.bad_sample;
     }
     result_.seconds = seconds();
   }
@@ -158,7 +169,8 @@ class Session {
     return std::tie(a.sample, a.y, a.x) < std::tie(b.sample, b.y, b.x);
   }
 
-  // --- render threads -----------------------------------------------------------------------------------------------------
+  // --- render threads
+  // -----------------------------------------------------------------------------------------------------
   void work(Worker& worker) {
     std::unique_ptr<PathTracer> tracer;
     for (std::int64_t seen = 0;;) {
@@ -171,7 +183,9 @@ class Session {
       try {
         if (!tracer) tracer = std::make_unique<PathTracer>(scene_);
         for (std::int64_t item; !cancelled_ && (item = next_item_++) < items_;)
-          if (!render_tile(*tracer, worker, static_cast<int>(item % tiles_), static_cast<int>(item / tiles_))) break;
+          if (!render_tile(*tracer, worker, static_cast<int>(item % tiles_),
+                           static_cast<int>(item / tiles_)))
+            break;
       } catch (...) {
         std::lock_guard lock(mutex_);
         if (!failure_) failure_ = std::current_exception();
@@ -182,7 +196,8 @@ class Session {
     }
   }
 
-  // One block of the round for all pixels of a tile. False when time is up or the render is cancelled.
+  // One block of the round for all pixels of a tile. False when time is up or the render is
+  // cancelled.
   bool render_tile(PathTracer& tracer, Worker& worker, int tile, int block_in_round) {
     const int first = round_first_ + block_in_round * kBlockSamples;
     const int last = std::min(first + kBlockSamples, round_first_ + round_count_);
@@ -211,10 +226,12 @@ class Session {
     const std::uint64_t scramble = block_scramble(options_.seed, pixel, sample / kBlockSamples);
     Rng rng(options_.seed, pixel, sample);
     const PixelPoint point = pixel_point(scramble, sample % kBlockSamples, rng);
-    const CameraRay ray = camera_.ray(x + 0.5 + filter_.offset(point.u), y + 0.5 + filter_.offset(point.v));
+    const CameraRay ray =
+        camera_.ray(x + 0.5 + filter_.offset(point.u), y + 0.5 + filter_.offset(point.v));
     const PathSample path = tracer.trace(ray.ray, ray.t_max, rng, worker.counters);
 
-    FilmSample film_sample{path.radiance, path.alpha, ray.depth(path.depth), path.normal, path.albedo};
+    FilmSample film_sample{path.radiance, path.alpha, ray.depth(path.depth), path.normal,
+                           path.albedo};
     const double brightest = max_component(path.radiance);
     if (clamp_ > 0 && brightest > clamp_ && std::isfinite(brightest)) {
       film_sample.radiance *= clamp_ / brightest;
@@ -257,7 +274,8 @@ class Session {
 
 }  // namespace
 
-RenderResult render(const Scene& scene, const RenderOptions& options, const ProgressCallback& progress) {
+RenderResult render(const Scene& scene, const RenderOptions& options,
+                    const ProgressCallback& progress) {
   return Session(scene, options).run(progress);
 }
 

@@ -1,4 +1,5 @@
-// One render: threads trace the rounds that the scheduler asks for into a film, until a stopping rule holds or it is cancelled.
+// One render: threads trace the rounds that the scheduler asks for into a film, until a stopping
+// rule holds or it is cancelled.
 #pragma once
 
 #include <cstdint>
@@ -27,9 +28,11 @@ struct Progress {
   double remaining = kInfinity;        // seconds, estimated; infinite while unknown
 };
 
-// `progress` is called from this thread at most ten times a second; false cancels, and the result holds what was done. What it
-// throws, and what a render thread throws, ends the render and comes out of here.
+// `progress` is called from this thread at most ten times a second; false cancels, and the result
+// holds what was done. What it throws, and what a render thread throws, ends the render and comes
+// out of here.
 using ProgressCallback = std::function<bool(const Progress&)>;
-RenderResult render(const Scene& scene, const RenderOptions& options, const ProgressCallback& progress);
+RenderResult render(const Scene& scene, const RenderOptions& options,
+                    const ProgressCallback& progress);
 
 }  // namespace gpis

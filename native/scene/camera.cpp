@@ -30,16 +30,21 @@ CameraRay Camera::ray(double x, double y) const {
       // The centre of the image looks along -z, its full width turns once about y.
       const double longitude = (x / image_width_ - 0.5) * 2 * kPi;
       const double latitude = (y / image_height_ - 0.5) * kPi;
-      const Vec3 d = normalize(right_ * (std::sin(longitude) * std::cos(latitude)) + up_ * std::sin(latitude) -
-                               back_ * (std::cos(longitude) * std::cos(latitude)));
+      const Vec3 d =
+          normalize(right_ * (std::sin(longitude) * std::cos(latitude)) + up_ * std::sin(latitude) -
+                    back_ * (std::cos(longitude) * std::cos(latitude)));
       return {{position_ + d * clip_near, d}, clip_far - clip_near, clip_near, 1};
     }
-    case CameraDescription::Type::perspective: break;
+    case CameraDescription::Type::perspective:
+      break;
   }
   const Vec3 to_plane = right_ * u + up_ * v - back_;
   const double per_depth = length(to_plane);  // 1 / cosine with the viewing axis
   const Vec3 d = to_plane / per_depth;
-  return {{position_ + to_plane * clip_near, d}, (clip_far - clip_near) * per_depth, clip_near, 1 / per_depth};
+  return {{position_ + to_plane * clip_near, d},
+          (clip_far - clip_near) * per_depth,
+          clip_near,
+          1 / per_depth};
 }
 
 }  // namespace gpis

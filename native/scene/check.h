@@ -8,11 +8,13 @@
 
 namespace gpis {
 
-// Names a member of one entry: "objects[2].matrix of 'bunny'" in a list, "materials['wood'].color" in a dict.
+// Names a member of one entry: "objects[2].matrix of 'bunny'" in a list, "materials['wood'].color"
+// in a dict.
 struct EntryPath {
   std::string entry, name;
 
-  EntryPath(const char* dict, const std::string& key) : entry(std::string(dict) + "['" + key + "']") {}
+  EntryPath(const char* dict, const std::string& key)
+      : entry(std::string(dict) + "['" + key + "']") {}
   EntryPath(const char* list, std::size_t i, const std::string& entry_name)
       : entry(std::string(list) + "[" + std::to_string(i) + "]"), name(entry_name) {}
   std::string operator+(const std::string& member) const {
