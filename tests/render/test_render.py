@@ -1,0 +1,350 @@
+"""A render as a whole: reproducible, mergeable, cancellable, honest about its error and about bad input."""
+
+import json
+import logging
+import threading
+import time
+
+import gpis_native as gn
+import numpy as np
+import pytest
+
+
+def same(a, b):
+    assert a.passes.keys() == b.passes.keys()
+    for name in a.passes:
+        assert a.passes[name].tobytes() == b.passes[name].tobytes(), name
+
+
+@pytest.fixture(scope="module")
+def noisy(noisy_scene):
+    return gn.Scene(noisy_scene())
+
+
+def test_every_pass_has_its_shape(noisy):
+    result = gn.render(noisy, 20, 10, samples=16)
+    channels = {"combined": 4, "depth": 1, "normal": 3, "albedo": 3, "variance": 3, "sample_count": 1}
+    assert {name: values.shape for name, values in result.passes.items()} == {
+        name: (10, 20, c) for name, c in channels.items()
+    }
+    assert result.passes is result.passes
+    assert (result.passes["sample_count"] == 16).all()
+
+
+def test_row_0_is_at_the_bottom(noisy):
+    """The floor rises away from the camera towards +y: further up is further away."""
+    depth = gn.render(noisy, 8, 16, samples=16).passes["depth"]
+    assert depth[0, -1, 0] < depth[-1, -1, 0]
+
+
+@pytest.mark.parametrize("scene_name", ["noisy_scene", "process_scene"])
+def test_threads_do_not_change_a_bit(scene_name, request):
+    scene = gn.Scene(request.getfixturevalue(scene_name)())
+    first = gn.render(scene, 21, 13, samples=40, threads=1, seed=5)
+    for threads in (2, 7, 0):
+        other = gn.render(scene, 21, 13, samples=40, threads=threads, seed=5)
+        same(first, other)
+        counters = {k: v for k, v in first.stats.items() if isinstance(v, int) and k != "threads"}
+        assert {k: other.stats[k] for k in counters} == counters
+    changed = gn.render(scene, 21, 13, samples=40, seed=6)
+    assert changed.passes["combined"].tobytes() != first.passes["combined"].tobytes()
+
+
+@pytest.mark.parametrize("cuts", [(16, 48), (32, 64), (16, 32, 48, 64, 80)])
+def test_slices_merge_to_the_whole_bit_by_bit(noisy, cuts):
+    samples = 90
+    whole = gn.render(noisy, 17, 9, samples=samples, seed=3)
+    ends = (0, *cuts, samples)
+    slices = [
+        gn.render(noisy, 17, 9, samples=b - a, first_sample=a, seed=3) for a, b in zip(ends[:-1], ends[1:], strict=True)
+    ]
+    same(gn.merge(slices), whole)
+    same(gn.merge(slices[::-1]), whole)
+    same(gn.merge([gn.merge(slices[:2]), *slices[2:]]), whole)
+    merged = gn.merge(slices)
+    assert merged.stats["camera_paths"] == whole.stats["camera_paths"] == 17 * 9 * samples
+    assert merged.stats["estimated_error"] == whole.stats["estimated_error"]
+    assert merged.history[-1]["samples"] == samples
+
+
+def test_merge_refuses_what_does_not_fit(noisy):
+    a = gn.render(noisy, 8, 8, samples=32)
+    with pytest.raises(ValueError, match=r"samples 0\.\.31 of seed 0 and samples 16\.\.31 of seed 0 overlap"):
+        gn.merge([a, gn.render(noisy, 8, 8, samples=16, first_sample=16)])
+    with pytest.raises(ValueError, match="different sizes"):
+        gn.merge([a, gn.render(noisy, 8, 9, samples=16, first_sample=32)])
+    with pytest.raises(ValueError, match="at least one"):
+        gn.merge([])
+    with pytest.raises(ValueError, match="list of results, got 3"):
+        gn.merge([a, 3])
+    gn.merge([a, gn.render(noisy, 8, 8, samples=32, seed=1)])
+
+
+def test_save_and_load_keep_every_bit(noisy, tmp_path):
+    path = tmp_path / "slice"  # no extension is added
+    slices = [gn.render(noisy, 9, 7, samples=32, first_sample=first) for first in (0, 32)]
+    slices[0].save(path)
+    loaded = gn.load_result(str(path))
+    same(loaded, slices[0])
+    assert loaded.stats == slices[0].stats and loaded.history == slices[0].history
+    same(gn.merge([loaded, slices[1]]), gn.render(noisy, 9, 7, samples=64))
+    assert [p.name for p in tmp_path.iterdir()] == ["slice"]
+
+
+def test_damaged_and_foreign_files_are_refused(noisy, tmp_path):
+    good = tmp_path / "good"
+    gn.render(noisy, 9, 7, samples=16).save(good)
+    data = good.read_bytes()
+    np.savez(tmp_path / "foreign.npz", a=np.ones(3))
+    broken = bytearray(data)
+    broken[len(data) // 3] ^= 0x55
+    for name, content in {
+        "truncated": data[: len(data) // 2],
+        "short": data[:-1],
+        "empty": b"",
+        "text": b"hello",
+        "flipped": bytes(broken),
+    }.items():
+        (tmp_path / name).write_bytes(content)
+    np.save(tmp_path / "plain.npy", np.ones(3))
+    for name in ("truncated", "short", "empty", "text", "flipped", "foreign.npz", "plain.npy"):
+        with pytest.raises(ValueError, match="is not a result that save wrote, or it is damaged"):
+            gn.load_result(tmp_path / name)
+    with pytest.raises(FileNotFoundError, match="there is no file"):
+        gn.load_result(tmp_path / "missing")
+    with pytest.raises(OSError):
+        gn.load_result(good).save(tmp_path / "no" / "such" / "folder")
+
+
+def test_estimated_error_is_the_error(noisy):
+    """The relMSE against a much better image, over 1200 pixels: within 4 standard errors, and 5% for the reference's own noise
+    and the noisy denominator."""
+    reference = gn.render(noisy, 40, 30, samples=4096, seed=100)
+    result = gn.render(noisy, 40, 30, samples=128, seed=1)
+    weights = (0.2126, 0.7152, 0.0722)
+    truth = reference.passes["combined"][..., :3].astype(float) @ weights
+    errors = (result.passes["combined"][..., :3].astype(float) @ weights - truth) ** 2 / (truth**2 + 0.01)
+    estimate = result.stats["estimated_error"]
+    assert abs(estimate - errors.mean()) < 4 * errors.std() / np.sqrt(errors.size) + 0.05 * estimate
+    assert result.history[-1]["estimated_error"] == estimate
+
+
+def test_variance_pass_is_the_variance_between_seeds(noisy):
+    """64 seeds: per pixel and channel the ratio of the mean estimate to the variance of the means; its average over the frame is
+    1 within 5% (each pixel's ratio has a relative deviation of about sqrt(2/63), 600 of them)."""
+    results = [gn.render(noisy, 20, 10, samples=64, seed=s) for s in range(64)]
+    means = np.array([r.passes["combined"][..., :3] for r in results], dtype=float)
+    estimates = np.array([r.passes["variance"] for r in results], dtype=float).mean(axis=0)
+    lit = means.mean(axis=0) > 1e-3
+    assert lit.mean() > 0.9
+    assert np.mean(estimates[lit] / means.var(axis=0, ddof=1)[lit]) == pytest.approx(1, abs=0.06)
+
+
+def test_an_exact_scene_has_no_error(empty_scene):
+    result = gn.render(gn.Scene(empty_scene((0.5, 0.25, 0.125))), 9, 5, samples=48)
+    assert (result.passes["combined"] == (0.5, 0.25, 0.125, 1)).all()
+    assert (result.passes["variance"] == 0).all()
+    assert result.stats["estimated_error"] < 1e-12  # luminance of exact colours is rounded
+
+
+def test_noise_threshold_ends_the_render(noisy):
+    result = gn.render(noisy, 16, 12, noise_threshold=0.03)
+    assert result.stats["stopped_by"] == "noise" and result.stats["samples"] > 64
+    assert np.sqrt(result.stats["estimated_error"]) <= 0.03 < np.sqrt(result.history[-2]["estimated_error"])
+    samples = result.stats["samples"]
+    same(result, gn.render(noisy, 16, 12, samples=int(samples)))
+
+
+def test_time_limit_gives_every_pixel_a_sample(noisy):
+    result = gn.render(noisy, 200, 200, time_limit=1e-6)
+    assert result.stats["stopped_by"] == "time"
+    assert (result.passes["sample_count"] == 1).all()
+    assert result.stats["camera_paths"] == 200 * 200
+    # A limit in the middle of a round: whole blocks only, whichever pixels got them, and they are those of a whole render.
+    result = gn.render(noisy, 64, 64, time_limit=0.3)
+    counts = result.passes["sample_count"][..., 0]
+    assert set(np.unique(counts % 16)) <= ({0.0} if counts.min() >= 16 else {0.0, 1.0})
+    done = int(counts.min())
+    if done >= 16 and done == counts.max():
+        same(result, gn.render(noisy, 64, 64, samples=done))
+
+
+def test_time_limited_sums_are_those_of_whole_blocks(noisy):
+    """The first block comes in two pieces (1 + 15 samples): the film must not show it."""
+    limited = gn.render(noisy, 12, 12, samples=48, time_limit=1e6)
+    assert [row["samples"] for row in limited.history][:3] == [1, 16, 32]
+    same(limited, gn.render(noisy, 12, 12, samples=48))
+
+
+def test_progress_runs_forward_and_tells_what_is_left(noisy):
+    calls = []
+    here = threading.get_ident()
+
+    def progress(fraction, stats):
+        assert threading.get_ident() == here
+        calls.append((fraction, stats))
+
+    result = gn.render(noisy, 300, 300, time_limit=1.0, progress=progress)
+    fractions = [f for f, _ in calls]
+    assert fractions == sorted(fractions) and 0 <= fractions[0] and fractions[-1] <= 1
+    assert 2 <= len(calls) <= 12 * result.stats["seconds"] + 3
+    assert set(calls[0][1]) == {"seconds", "samples", "estimated_error", "remaining", "error_left"}
+    known = [s for _, s in calls if np.isfinite(s["estimated_error"])]
+    for stats in known:
+        assert stats["error_left"] == pytest.approx(np.sqrt(stats["estimated_error"]))
+
+
+def test_false_cancels(noisy):
+    began = []
+
+    def progress(fraction, stats):
+        began.append(time.monotonic())
+        return False
+
+    result = gn.render(noisy, 2000, 2000, samples=100000, progress=progress)
+    assert time.monotonic() - began[0] < 5  # seconds of a render that takes days
+    assert len(began) == 1
+    assert result.stats["cancelled"] is True and result.stats["stopped_by"] is None
+    assert result.passes["combined"].shape == (2000, 2000, 4)
+    assert np.isfinite(result.passes["combined"]).all()
+
+
+def test_an_exception_in_progress_ends_the_render(noisy):
+    class Stop(Exception):
+        pass
+
+    def progress(fraction, stats):
+        raise Stop("now")
+
+    with pytest.raises(Stop, match="now"):
+        gn.render(noisy, 2000, 2000, samples=100000, progress=progress)
+
+
+def test_ctrl_c_ends_the_render(noisy):
+    import os
+    import signal
+
+    timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        gn.render(noisy, 2000, 2000, samples=100000)
+    timer.join()
+
+
+def test_python_runs_while_rendering_and_renders_run_at_once(noisy):
+    """Two renders that end only when the other one has begun: with the lock held they would never return."""
+    begun = [threading.Event(), threading.Event()]
+    results = [None, None]
+
+    def run(i):
+        def progress(fraction, stats):
+            begun[i].set()
+            return not begun[1 - i].is_set()
+
+        results[i] = gn.render(noisy, 500, 500, samples=100000, seed=i, progress=progress)
+
+    threads = [threading.Thread(target=run, args=(i,)) for i in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(timeout=60)
+        assert not thread.is_alive()
+    assert all(r.stats["cancelled"] for r in results)
+    # And with both at work at once the images are what they are alone.
+    pair = [None, None]
+
+    def short(i):
+        pair[i] = gn.render(noisy, 40, 40, samples=32, seed=i)
+
+    threads = [threading.Thread(target=short, args=(i,)) for i in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for i in range(2):
+        same(pair[i], gn.render(noisy, 40, 40, samples=32, seed=i))
+
+
+def test_clamp_is_counted(noisy_scene):
+    plain = gn.render(gn.Scene(noisy_scene()), 10, 10, samples=32)
+    clamped = gn.render(gn.Scene(noisy_scene(clamp=0.5)), 10, 10, samples=32)
+    assert plain.stats["clamped_samples"] == 0 < clamped.stats["clamped_samples"]
+    assert clamped.passes["combined"][..., :3].max() <= 0.5
+    assert gn.render(gn.Scene(noisy_scene(clamp=1e6)), 10, 10, samples=32).stats["clamped_samples"] == 0
+
+
+def test_memory_overrides_the_objects(process_scene):
+    description = process_scene()
+    description["objects"][0]["memory"] = "renewal"
+    scene = gn.Scene(description)
+    renewal = gn.render(scene, 12, 12, samples=16)
+    same(gn.render(scene, 12, 12, samples=16, memory="renewal"), renewal)
+    other = gn.render(scene, 12, 12, samples=16, memory="renewal+")
+    assert other.passes["combined"].tobytes() != renewal.passes["combined"].tobytes()
+    same(other, gn.render(gn.Scene(process_scene()), 12, 12, samples=16))
+
+
+def test_stats_are_plain_data(noisy):
+    stats = gn.render(noisy, 8, 8, samples=32).stats
+    json.dumps(stats)
+    assert stats["nan_samples"] == 0 and stats["first_nan_sample"] is None
+    assert stats["width"] == stats["height"] == 8 and stats["samples"] == 32
+    assert stats["ranges"] == [{"seed": 0, "first": 0, "count": 32}]
+    assert stats["camera_paths_per_second"] > 0 and stats["rays_per_second"] > 0
+
+
+def test_samples_that_are_not_finite_are_told(noisy_scene, caplog):
+    """A lamp as bright as a double can be: what it lights is infinite, is left out, counted, and logged once."""
+    description = noisy_scene()
+    description["lights"][0]["power"] = 1e308
+    description["lights"][0]["color"] = (1e308,) * 3
+    with caplog.at_level(logging.WARNING, "gpis"):
+        result = gn.render(gn.Scene(description), 10, 10, samples=32)
+    assert result.stats["nan_samples"] > 0
+    assert set(result.stats["first_nan_sample"]) == {"x", "y", "sample"}
+    assert len(caplog.records) == 1 and "not finite" in caplog.text
+    assert np.isfinite(result.passes["combined"]).all()
+    assert (result.passes["sample_count"].sum() + result.stats["nan_samples"]) == 3200
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (dict(samples=None), "needs to know when to stop"),
+        (dict(samples=0), "samples: takes an integer from 1"),
+        (dict(samples=1.5), "samples: takes an integer from 1 to 2^30, got 1.5"),
+        (dict(samples=True), "samples"),
+        (dict(samples=2**40), "samples"),
+        (dict(width=0), "width"),
+        (dict(height=-3), "height"),
+        (dict(width="8"), "width: takes a number of pixels, 1 to 65536, got '8'"),
+        (dict(time_limit=0), "time_limit"),
+        (dict(time_limit=float("nan")), "time_limit"),
+        (dict(time_limit=float("inf")), "time_limit"),
+        (dict(noise_threshold=-0.1), "noise_threshold"),
+        (dict(first_sample=8), "first_sample: takes a multiple of 16"),
+        (dict(first_sample=-16), "first_sample"),
+        (dict(seed=-1), "seed"),
+        (dict(threads=-1), "threads"),
+        (dict(memory="global"), "memory"),
+        (dict(memory=3), "memory"),
+        (dict(progress=3), "progress: takes a function"),
+    ],
+)
+def test_wrong_arguments_are_refused(noisy, wrong, words):
+    arguments = dict(width=8, height=8, samples=16) | wrong
+    with pytest.raises(ValueError) as error:
+        gn.render(noisy, **arguments)
+    assert words in str(error.value)
+
+
+def test_unknown_keywords_are_refused(noisy):
+    with pytest.raises(TypeError):
+        gn.render(noisy, 8, 8, samples=16, sample=3)
+    with pytest.raises(TypeError):
+        gn.render(noisy, 8, 8, 16)
+
+
+def test_numpy_numbers_are_numbers(noisy):
+    result = gn.render(noisy, np.int64(8), np.int32(8), samples=np.uint16(16), noise_threshold=np.float32(0.1), seed=np.int64(2))
+    assert result.stats["stopped_by"] == "samples"
