@@ -1,5 +1,4 @@
 #include "binding/bindings.h"
-
 #include "field/openvdb_version.h"
 #include "geometry/embree_api.h"
 

@@ -1,5 +1,5 @@
-// Errors that become Python exceptions: std::invalid_argument -> ValueError, FileNotFound -> FileNotFoundError.
-// Every message is a sentence: what, what it held, what to do.
+// Errors that become Python exceptions: std::invalid_argument -> ValueError, FileNotFound ->
+// FileNotFoundError. Every message is a sentence: what, what it held, what to do.
 #pragma once
 
 #include <stdexcept>

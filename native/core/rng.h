@@ -1,4 +1,5 @@
-// Random numbers: one independent stream per (seed, pixel, sample), so that an image depends neither on threads nor on tiles.
+// Random numbers: one independent stream per (seed, pixel, sample), so that an image depends
+// neither on threads nor on tiles.
 #pragma once
 
 #include <boost/random/normal_distribution.hpp>

@@ -18,31 +18,61 @@ struct Vec3 {
   double& operator[](int i) { return i == 0 ? x : i == 1 ? y : z; }
 };
 
-inline Vec3 operator+(const Vec3& a, const Vec3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-inline Vec3 operator-(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-inline Vec3 operator-(const Vec3& a) { return {-a.x, -a.y, -a.z}; }
-inline Vec3 operator*(const Vec3& a, const Vec3& b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
-inline Vec3 operator*(const Vec3& a, double s) { return {a.x * s, a.y * s, a.z * s}; }
-inline Vec3 operator*(double s, const Vec3& a) { return a * s; }
-inline Vec3 operator/(const Vec3& a, double s) { return {a.x / s, a.y / s, a.z / s}; }
-inline Vec3& operator+=(Vec3& a, const Vec3& b) { return a = a + b; }
-inline Vec3& operator*=(Vec3& a, const Vec3& b) { return a = a * b; }
-inline Vec3& operator*=(Vec3& a, double s) { return a = a * s; }
+inline Vec3 operator+(const Vec3& a, const Vec3& b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+inline Vec3 operator-(const Vec3& a, const Vec3& b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+inline Vec3 operator-(const Vec3& a) {
+  return {-a.x, -a.y, -a.z};
+}
+inline Vec3 operator*(const Vec3& a, const Vec3& b) {
+  return {a.x * b.x, a.y * b.y, a.z * b.z};
+}
+inline Vec3 operator*(const Vec3& a, double s) {
+  return {a.x * s, a.y * s, a.z * s};
+}
+inline Vec3 operator*(double s, const Vec3& a) {
+  return a * s;
+}
+inline Vec3 operator/(const Vec3& a, double s) {
+  return {a.x / s, a.y / s, a.z / s};
+}
+inline Vec3& operator+=(Vec3& a, const Vec3& b) {
+  return a = a + b;
+}
+inline Vec3& operator*=(Vec3& a, const Vec3& b) {
+  return a = a * b;
+}
+inline Vec3& operator*=(Vec3& a, double s) {
+  return a = a * s;
+}
 
-inline double dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+inline double dot(const Vec3& a, const Vec3& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
 inline Vec3 cross(const Vec3& a, const Vec3& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-inline double length(const Vec3& a) { return std::sqrt(dot(a, a)); }
-inline Vec3 normalize(const Vec3& a) { return a / length(a); }
-inline double max_component(const Vec3& a) { return std::max(a.x, std::max(a.y, a.z)); }
+inline double length(const Vec3& a) {
+  return std::sqrt(dot(a, a));
+}
+inline Vec3 normalize(const Vec3& a) {
+  return a / length(a);
+}
+inline double max_component(const Vec3& a) {
+  return std::max(a.x, std::max(a.y, a.z));
+}
 inline bool is_finite(const Vec3& a) {
   return std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(a.z);
 }
 
 // Colours are vectors of linear RGB.
 using Color = Vec3;
-inline double luminance(const Color& c) { return 0.2126 * c.x + 0.7152 * c.y + 0.0722 * c.z; }
+inline double luminance(const Color& c) {
+  return 0.2126 * c.x + 0.7152 * c.y + 0.0722 * c.z;
+}
 
 // Row-major 3x3 matrix.
 struct Mat3 {
@@ -63,7 +93,9 @@ inline Mat3 operator*(const Mat3& a, const Mat3& b) {
     r.row[i] = {dot(a.row[i], bt.row[0]), dot(a.row[i], bt.row[1]), dot(a.row[i], bt.row[2])};
   return r;
 }
-inline double determinant(const Mat3& m) { return dot(m.row[0], cross(m.row[1], m.row[2])); }
+inline double determinant(const Mat3& m) {
+  return dot(m.row[0], cross(m.row[1], m.row[2]));
+}
 // The caller has checked that the determinant is not zero.
 inline Mat3 inverse(const Mat3& m) {
   const double s = 1 / determinant(m);
@@ -107,8 +139,9 @@ struct Box3 {
   }
 };
 
-// The interval of t in which origin + t direction lies in the box; empty if first > second. A direction component of zero
-// keeps or rejects the whole slab (no 0·inf), so rays along a face count as inside.
+// The interval of t in which origin + t direction lies in the box; empty if first > second. A
+// direction component of zero keeps or rejects the whole slab (no 0·inf), so rays along a face
+// count as inside.
 inline std::pair<double, double> clip(const Box3& box, const Vec3& o, const Vec3& d, double t0,
                                       double t1) {
   for (int i = 0; i < 3; ++i) {
@@ -123,7 +156,8 @@ inline std::pair<double, double> clip(const Box3& box, const Vec3& o, const Vec3
   return {t0, t1};
 }
 
-// Orthonormal frame about a unit normal (Duff et al. 2017, "Building an orthonormal basis, revisited").
+// Orthonormal frame about a unit normal (Duff et al. 2017, "Building an orthonormal basis,
+// revisited").
 struct Frame {
   Vec3 s, t, n;
 

@@ -4,6 +4,8 @@
 
 namespace gpis {
 
-std::string openvdb_version() { return OPENVDB_LIBRARY_VERSION_STRING; }
+std::string openvdb_version() {
+  return OPENVDB_LIBRARY_VERSION_STRING;
+}
 
 }  // namespace gpis
