@@ -40,6 +40,10 @@ struct PathTracer::Impl {
   PathSample trace(const Ray& camera_ray, double t_max);
   bool closest(const Ray& ray, double t_max, Vertex& v);
   void remember_others(const Vertex& v);
+  Vec3 draw(const GradientLaw& law) {
+    if (!law.degenerate) counters->line_normals += 2;
+    return law.draw(*rng);
+  }
   bool visible(const Ray& ray, double distance);
   template <class Scatter, class Remember>
   Color sample_lights(const Vertex& v, const Scatter& scatter, const Remember& remember);
@@ -167,7 +171,7 @@ void PathTracer::Impl::remember_others(const Vertex& v) {
       continue;
     }
     const Vec3 gradient = surface.memory() == Memory::renewal_plus
-                              ? surface.gradient_law(lines[i], v.t).draw(*rng)
+                              ? draw(surface.gradient_law(lines[i], v.t))
                               : Vec3{};
     memory[i] = surface.state(value, gradient);
   }
@@ -218,7 +222,7 @@ std::optional<ScatterSample> PathTracer::Impl::scatter_at(const Ray& ray, const 
 
   const ProcessSurface& surface = scene.stochastic[v.surface].surface;
   const GradientLaw law = surface.gradient_law(lines[v.surface], v.t);
-  const Vec3 gradient = law.draw(*rng);
+  const Vec3 gradient = draw(law);
   memory[v.surface] = surface.state(0, gradient);
   normal = normalize(gradient);
   if (v.material->specular() && !law.degenerate) {

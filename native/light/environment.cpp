@@ -37,9 +37,8 @@ class ImageEnvironment final : public Light {
         image_(image),
         to_world_(image_to_world),
         strength_(strength) {
-    std::vector<double> weights;
-    weights.reserve(static_cast<std::size_t>(width) * (height + 1));
-    double sum = 0;
+    std::vector<Piecewise1D> rows;
+    std::vector<double> row(width);
     for (int j = 0; j <= height; ++j) {
       const double band = sin_latitude(j + 1) - sin_latitude(j);
       for (int i = 0; i < width; ++i) {
@@ -47,12 +46,12 @@ class ImageEnvironment final : public Light {
         double brightness = 0;
         for (const Color& c : {texel(i, j - 1), texel(i + 1, j - 1), texel(i, j), texel(i + 1, j)})
           brightness += luminance({std::abs(c.x), std::abs(c.y), std::abs(c.z)}) / 4;
-        weights.push_back(brightness * band);
-        sum += weights.back();
+        row[i] = brightness * band;
       }
+      rows.emplace_back(row);
     }
-    mean_ = sum * strength / (2 * width);
-    patches_.emplace(weights, width);
+    patches_.emplace(std::move(rows));
+    mean_ = patches_->sum() * strength / (2 * width);
   }
 
   double power(double r) const override { return mean_ * 4 * kPi * kPi * r * r; }

@@ -33,15 +33,12 @@ class Piecewise1D {
   std::vector<double> cumulative_{0};
 };
 
-// Cells (i, j) of a table with `width` columns, row by row: first the row, then the column in it.
+// Cells (i, j) of a table: first the row j, then the column i in it.
 class Piecewise2D {
  public:
-  Piecewise2D(const std::vector<double>& weights, int width) {
+  explicit Piecewise2D(std::vector<Piecewise1D> rows) : columns_(std::move(rows)) {
     std::vector<double> sums;
-    for (auto row = weights.begin(); row != weights.end(); row += width) {
-      columns_.emplace_back(std::vector<double>(row, row + width));
-      sums.push_back(columns_.back().sum());
-    }
+    for (const Piecewise1D& row : columns_) sums.push_back(row.sum());
     rows_ = Piecewise1D(sums);
   }
   std::pair<int, int> sample(double u1, double u2) const {
@@ -51,6 +48,7 @@ class Piecewise2D {
   double probability(int i, int j) const {
     return rows_.probability(j) * columns_[j].probability(i);
   }
+  double sum() const { return rows_.sum(); }
 
  private:
   Piecewise1D rows_;

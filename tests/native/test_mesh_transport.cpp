@@ -190,3 +190,64 @@ TEST(first_hit_features_are_those_of_the_surface) {
   CHECK(tracer.trace({{0, 0, 3}, {0, 0, -1}}, 1.5, rng, counters).depth, ==,
         kInfinity);  // beyond the camera's far end
 }
+
+TEST(triangles_find_their_material_and_normals) {
+  // Two triangles of one mesh, two materials each of two objects, one of them mirrored and
+  // stretched.
+  SceneDescription s;
+  s.materials = {lambert(0.1), lambert(0.2), lambert(0.3), lambert(0.4)};
+  s.meshes = {plane_mesh()};
+  s.meshes[0].material_index = {0, 1};
+  s.meshes[0].normals_per_corner = true;
+  for (int corner = 0; corner < 6; ++corner)
+    for (const float c : {corner < 3 ? 0.6f : 0.f, 0.f, corner < 3 ? 0.8f : 1.f})
+      s.meshes[0].normals.push_back(c);
+  add_mesh_object(s, 0, 0);
+  s.objects[0].materials = {0, 1};
+  add_mesh_object(s, 0, 0, {{{Vec3{-2, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}}}, {10, 0, 0}});
+  s.objects[1].materials = {2, 3};
+  const Scene scene(s);
+  PathTracer tracer(scene);
+  Counters counters;
+  const auto seen = [&](double x, double y) {
+    Rng rng(1, 0);
+    return tracer.trace({{x, y, 5}, {0, 0, -1}}, kInfinity, rng, counters);
+  };
+  CHECK(seen(0.5, -0.5).albedo.x, ==, 0.1);
+  CHECK(seen(-0.5, 0.5).albedo.x, ==, 0.2);
+  CHECK(seen(9, -0.5).albedo.x, ==, 0.3);
+  CHECK(seen(11, 0.5).albedo.x, ==, 0.4);
+  CHECK(length(seen(0.5, -0.5).normal - Vec3{0.6, 0, 0.8}), <, 1e-6);
+  CHECK(length(seen(-0.5, 0.5).normal - Vec3{0, 0, 1}), <, 1e-6);
+  CHECK(length(seen(9, -0.5).normal - normalize({-0.3, 0, 0.8})), <, 1e-6);
+}
+
+TEST(camera_sees_lights_only_if_asked) {
+  SceneDescription s;
+  s.materials = {material(MaterialDescription::Type::mirror, 1)};
+  s.meshes = {plane_mesh()};
+  add_mesh_object(s, 0, 0);
+  s.lights = {light(LightDescription::Type::point, {0, 0, 2})};
+  s.lights[0].radius = 0.5;
+  const auto at_light = [](Rng&) { return Ray{{0, 0, 1}, {0, 0, 1}}; };
+  const auto at_mirror = [](Rng&) { return Ray{{0, 0, 1}, {0, 0, -1}}; };
+  const double radiance = 100 / (4 * kPi * kPi * 0.25);
+  CHECK(trace(s, at_light, 2).radiance.mean(), ==, 0.0);
+  CHECK(std::abs(trace(s, at_mirror, 2).radiance.mean() / radiance - 1), <, 1e-9);
+  s.lights[0].visible_to_camera = true;
+  CHECK(std::abs(trace(s, at_light, 2).radiance.mean() / radiance - 1), <, 1e-9);
+}
+
+TEST(paths_that_cannot_end_are_counted) {
+  SceneDescription s;
+  s.materials = {lambert(1)};
+  s.meshes = {cube_mesh()};
+  add_mesh_object(s, 0, 0);
+  const Render r = trace(
+      s,
+      [](Rng& rng) {
+        return Ray{{}, any_direction(rng)};
+      },
+      2);
+  CHECK(r.counters.path_length_limit, ==, 2u);
+}
