@@ -91,7 +91,11 @@ WRONG = [
     ("world.colour", (1, 1, 1), "world: unknown key 'colour'"),
     ("lights.0.size", (1, 1), "lights[0]: unknown key 'size' (a point light takes type, name, matrix, color, power"),
     ("lights.0.power", DROP, "lights[0]: key 'power' is missing"),
-    ("materials.gold.rougness", 0.1, "materials['gold']: unknown key 'rougness' (a conductor material takes type, color, roughness)"),
+    (
+        "materials.gold.rougness",
+        0.1,
+        "materials['gold']: unknown key 'rougness' (a conductor material takes type, color, roughness)",
+    ),
     ("materials.wood.roughness", 0.1, "materials['wood']: unknown key 'roughness'"),
     ("meshes.flat.verts", 3, "meshes['flat']: unknown key 'verts'"),
     ("meshes.flat.triangles", DROP, "meshes['flat']: key 'triangles' is missing"),
