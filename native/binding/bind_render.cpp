@@ -159,55 +159,59 @@ std::shared_ptr<RenderResult> merge_results(const py::object& results) {
   return std::make_shared<RenderResult>(merge(parts));
 }
 
+const char* const kPassesDoc = R"(dict of float32 arrays (H, W, C), row 0 at the bottom:
+combined (4, premultiplied); depth (1, along the viewing axis, mean of the samples that hit, inf where none did); normal (3);
+albedo (3); variance (3, of the pixel's mean; inf where there are fewer than two samples); sample_count (1).)";
+
+const char* const kHistoryDoc = R"(A dict(seconds, samples, estimated_error) per round.
+
+samples is the mean per pixel, estimated_error the mean over pixels of (variance of the mean) / (mean² + .01) on luminance
+(relMSE), inf while a pixel has fewer than two samples.)";
+
+const char* const kStatsDoc = R"(dict: every counter, and what the render was.
+
+width, height, seconds, threads, samples (mean per pixel), estimated_error, camera_paths_per_second, rays_per_second,
+stopped_by ("samples", "time", "noise"; None if cancelled or merged), cancelled, first_nan_sample (None or dict(x, y, sample)),
+ranges (list of dict(seed, first, count): the samples it was made of).)";
+
+const char* const kSaveDoc =
+    R"(Writes the result with its exact sums, so that what load_result returns can still be merged.
+
+A numpy .npz file whatever the path is called; an older file is replaced when the new one is complete. Raises OSError.)";
+
+const char* const kMergeDoc = R"(The result of all samples of several results of the same picture.
+
+Slices (first_sample and samples multiples of 16, except the samples of the last) merge to the whole render bit by bit; results
+of different seeds merge too. Raises ValueError where sizes differ or samples overlap.)";
+
+// A property that is made when first asked for and kept.
+template <class Make>
+auto kept(const char* name, Make make) {
+  return [name, make](const py::object& self) -> py::object {
+    if (!py::hasattr(self, name)) self.attr(name) = make(self.cast<const RenderResult&>());
+    return self.attr(name);
+  };
+}
+
 }  // namespace
 
 void bind_render(py::module_& m) {
-  // dynamic_attr: passes are made when first asked for and kept.
   py::class_<RenderResult, std::shared_ptr<RenderResult>>(
       m, "RenderResult", py::dynamic_attr(), "What render, merge and load_result return.")
       .def_property_readonly(
-          "passes",
-          [](const py::object& self) {
-            if (!py::hasattr(self, "_passes"))
-              self.attr("_passes") = film_passes(self.cast<const RenderResult&>().film);
-            return self.attr("_passes");
-          },
-          "dict of float32 arrays (H, W, C), row 0 at the bottom: combined (4, premultiplied), "
-          "depth (1, along the viewing axis,\n"
-          "mean of the samples that hit, inf where none did), normal (3), albedo (3), variance (3, "
-          "of the pixel's mean; inf where\n"
-          "there are fewer than two samples), sample_count (1).")
-      .def_property_readonly(
-          "history", [](const RenderResult& r) { return history_list(r); },
-          "A dict(seconds, samples, estimated_error) per round: samples is the mean per pixel, "
-          "estimated_error\n"
-          "the mean over pixels of (variance of the mean) / (mean² + .01) on luminance (relMSE), "
-          "inf while a\n"
-          "pixel has fewer than two samples.")
-      .def_property_readonly(
-          "stats", [](const RenderResult& r) { return stats_dict(r); },
-          "dict: every counter, and width, height, seconds, threads, samples (mean per pixel), "
-          "estimated_error,\n"
-          "camera_paths_per_second, rays_per_second, stopped_by (\"samples\", \"time\", \"noise\" "
-          "or None), cancelled,\n"
-          "first_nan_sample (None or dict(x, y, sample)), ranges (list of dict(seed, first, "
-          "count)).")
-      .def("save", &save_result, py::arg("path"),
-           "Writes the result with its exact sums, so that what load_result returns can still be "
-           "merged. A numpy .npz file,\n"
-           "whatever the path is called; replaced only when completely written. Raises OSError.");
+          "passes", kept("_passes", [](const RenderResult& r) { return film_passes(r.film); }),
+          kPassesDoc)
+      .def_property_readonly("history", &history_list, kHistoryDoc)
+      .def_property_readonly("stats", kept("_stats", &stats_dict), kStatsDoc)
+      .def("save", &save_result, py::arg("path"), kSaveDoc);
   m.def("render", &render_scene, kRenderDoc, py::arg("scene"), py::arg("width"), py::arg("height"),
         py::kw_only(), py::arg("samples") = py::none(), py::arg("time_limit") = py::none(),
         py::arg("noise_threshold") = py::none(), py::arg("first_sample") = 0, py::arg("seed") = 0,
         py::arg("threads") = 0, py::arg("memory") = py::none(), py::arg("progress") = py::none());
-  m.def("merge", &merge_results, py::arg("results"),
-        "The result of all samples of several results of the same picture: slices (first_sample, "
-        "samples multiples of 16 except\n"
-        "in the last) merge to the whole render bit by bit. Raises ValueError where sizes differ "
-        "or samples overlap.");
+  m.def("merge", &merge_results, py::arg("results"), kMergeDoc);
   m.def("load_result", &load_result, py::arg("path"),
-        "A result written by result.save. Raises FileNotFoundError, or ValueError where the file "
-        "is something else or damaged.");
+        "A result written by result.save. Raises FileNotFoundError; ValueError where the file is "
+        "something else or damaged.");
   m.def(
       "_next_round",
       [](int done, double seconds, double error, std::optional<int> samples,

@@ -69,8 +69,9 @@ void refuse(const std::string& path, const std::string& sentence) {
 std::string shown(const py::handle& value) {
   if (value.is_none() || py::isinstance<py::bool_>(value) || py::isinstance<py::int_>(value) ||
       py::isinstance<py::float_>(value) || py::isinstance<py::str>(value)) {
-    std::string s = py::repr(value);
-    return s.size() > 80 ? s.substr(0, 77) + "…" : s;
+    const py::str text = py::repr(value);
+    if (py::len(text) <= 80) return text;
+    return std::string(py::str(text[py::slice(0, 77, 1)])) + "…";
   }
   if (py::isinstance<py::array>(value))
     return "an array of shape " + shape_text(py::cast<py::array>(value));

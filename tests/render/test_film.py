@@ -52,9 +52,10 @@ def test_fewer_than_two_samples_have_no_known_variance():
 
 @pytest.mark.parametrize("stratified", [False, True])
 def test_variance_is_that_of_the_mean_over_many_renders(stratified, seed):
-    """4000 films of 8 blocks of a bimodal law, once with samples inside a block that depend on each other (stratified, so that
-    the mean's variance is far below that of independent samples). The mean of the estimates against the variance of the means:
-    each is known to its own standard error; the difference must be within 4 of the combined one (chance 6e-5 per channel)."""
+    """4000 films of 8 blocks of a bimodal law, once with samples inside a block that depend on each other (stratified,
+    so that the mean's variance is far below that of independent samples). The mean of the estimates against the
+    variance of the means: each is known to its own standard error, the difference must be within 4 of the combined one
+    (chance 6e-5 per channel)."""
     rng = np.random.default_rng(seed)
     films, count = 4000, 128
     u = rng.uniform(size=(films, count // 16, 16, 3))
@@ -74,8 +75,8 @@ def test_variance_is_that_of_the_mean_over_many_renders(stratified, seed):
 
 
 def test_estimated_error_is_relmse(seed):
-    """Over 4096 pixels of known means the estimate is the true relMSE within 4 standard errors; the bias that the estimated
-    mean in the denominator brings is of second order at 128 samples (below 1%, allowed for)."""
+    """Over 4096 pixels of known means the estimate is the true relMSE within 4 standard errors; the bias that the
+    estimated mean in the denominator brings is of second order at 128 samples (below 1%, allowed for)."""
     rng = np.random.default_rng(seed)
     means = np.exp(rng.uniform(-4, 2, 4096))
     samples = rng.exponential(1.0, (1, 4096, 128, 1)) * means[None, :, None, None] * np.ones(3)
