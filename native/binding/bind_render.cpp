@@ -88,7 +88,7 @@ const char* const kRenderDoc = R"(Renders a scene and returns a RenderResult.
 width, height: pixels. At least one of these says when to stop; whichever is reached first does:
     samples: per pixel
     time_limit: seconds; every pixel gets at least one sample, so the limit is passed where one sample of all pixels takes longer.
-        Stops with the pixel in hand: sample_count may then differ by 15 or 16 from pixel to pixel
+        Stops with the pixel in hand: sample_count may then differ from pixel to pixel, by whole blocks of 16
     noise_threshold: stops when the square root of estimated_error is at most this (looked at from 64 samples on)
 first_sample: number of the first sample, a multiple of 16: a slice of a longer render, see merge
 seed: random streams depend on (seed, pixel, sample) only, so the image is the same bit by bit whatever `threads`

@@ -30,7 +30,8 @@ Round next_round(const StoppingRules& rules, const RenderState& state) {
       state.estimated_error <= *rules.noise_threshold * *rules.noise_threshold)
     return {0, Round::Stop::noise};
 
-  if (done == 0 && rules.time_limit) return {1};
+  if (done < kBlockSamples && rules.time_limit)
+    return {std::min({std::max(done, 1), kBlockSamples - done, limit - done})};
   if (done < kBlockSamples) return {std::min(kBlockSamples - done, limit - done)};
   int count = std::max(done / 4, 1);
   if (rules.noise_threshold && std::isfinite(state.estimated_error)) {

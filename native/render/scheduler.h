@@ -28,9 +28,10 @@ struct Round {
 };
 
 // Rounds hold whole blocks of 16 samples and add a quarter to those there are, so that the error is
-// looked at on a logarithmic scale. Exceptions: with a time limit the very first round is a single
-// sample (every pixel gets one, whatever the limit) and the second the rest of its block; `samples`
-// ends the last round; a noise threshold ends a round where it should be reached.
+// looked at on a logarithmic scale. Exceptions: with a time limit the first round is a single
+// sample (every pixel gets one, whatever the limit) and the first block is made in rounds that
+// double, so that even a short render has about the same in every pixel; `samples` ends the last
+// round; a noise threshold ends a round where it should be reached.
 Round next_round(const StoppingRules& rules, const RenderState& state);
 
 // Part of the whole render that is done, in [0, 1], by the rule that is nearest to its end.

@@ -199,9 +199,7 @@ def test_a_description_is_a_dict():
 def test_a_material_colour_takes_no_field():
     description = full()
     description["materials"]["wood"]["color"] = gn.SphereField((0, 0, 0), 1.0)
-    with pytest.raises(
-        ValueError, match=r"materials\['wood'\]\.color: takes numbers of shape \(3,\), got a value of type"
-    ):
+    with pytest.raises(ValueError, match=r"materials\['wood'\]\.color: takes numbers of shape \(3,\), got a value of type"):
         gn.Scene(description)
 
 
