@@ -28,7 +28,7 @@ SUN = Euler((math.radians(58), 0, math.radians(-52)))  # where the sun shines fr
 
 
 def arguments():
-    own = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:] if bpy.app.module else []
+    own = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:] if not bpy.app.binary_path else []
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--output", type=Path, default=ROOT / "out", help="folder of the three files")
     parser.add_argument("--width", type=int, default=640, help="pixels; the height is 9/16 of it")
