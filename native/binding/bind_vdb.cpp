@@ -3,9 +3,13 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <chrono>
+#include <climits>
+
 #include "binding/arguments.h"
 #include "binding/bindings.h"
 #include "field/check.h"
+#include "field/mesh_bake.h"
 #include "field/vdb_field.h"
 #include "field/vdb_file.h"
 
@@ -140,6 +144,43 @@ py::dict read(const py::object& path, const std::vector<std::string>& names) {
   return out;
 }
 
+py::object bake(
+    const py::array_t<double, py::array::c_style | py::array::forcecast>& vertices,
+    const py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>& triangles,
+    const py::object& path, int resolution, double margin, const py::object& progress) {
+  if (vertices.ndim() != 2 || vertices.shape(1) != 3)
+    refuse("bake_mesh_distance: vertices has ", vertices.ndim(), " dimensions; it takes (N, 3).");
+  if (triangles.ndim() != 2 || triangles.shape(1) != 3)
+    refuse("bake_mesh_distance: triangles has ", triangles.ndim(), " dimensions; it takes (M, 3).");
+  std::vector<Vec3> points(vertices.shape(0));
+  for (py::ssize_t i = 0; i < vertices.shape(0); ++i)
+    points[i] = {vertices.at(i, 0), vertices.at(i, 1), vertices.at(i, 2)};
+  std::vector<std::array<int, 3>> faces(triangles.shape(0));
+  for (py::ssize_t i = 0; i < triangles.shape(0); ++i)
+    for (int c = 0; c < 3; ++c)
+      faces[i][c] = static_cast<int>(std::clamp<std::int64_t>(triangles.at(i, c), -1, INT_MAX));
+  const auto report_progress = [&](double fraction) {
+    py::gil_scoped_acquire acquire;
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    return progress.is_none() || !progress(fraction).is(py::bool_(false));
+  };
+  const auto file = py::str(path).cast<std::string>();
+  const auto start = std::chrono::steady_clock::now();
+  std::optional<MeshBake> report;
+  {
+    py::gil_scoped_release release;
+    report = bake_mesh_distance(points, faces, file, resolution, margin, report_progress);
+  }
+  if (!report) return py::none();
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return py::dict("voxel_size"_a = report->voxel_size, "origin"_a = to_triple(report->origin),
+                  "resolution"_a = report->resolution,
+                  "closed"_a = report->open_edges == 0 && !report->meets_itself,
+                  "open_edges"_a = report->open_edges, "meets_itself"_a = report->meets_itself,
+                  "seconds"_a = seconds);
+}
+
 }  // namespace
 
 void bind_vdb(py::module_& m) {
@@ -164,6 +205,18 @@ xx,yy,zz,xy,xz,yz, kept as two vector grids). Single precision; every node is ac
       R"(Grids of a .vdb file as a dict of arrays (X, Y, Z) or (X, Y, Z, 3), 'anisotropy' (X, Y, Z, 6), origin and voxel_size.
 
 Arrays cover the box of all active voxels of the grids read (`names`, or all of them), which must stand on the same nodes.)");
+  m.def(
+      "bake_mesh_distance", &bake, "vertices"_a, "triangles"_a, "path"_a, py::kw_only(),
+      "resolution"_a = 96, "margin"_a = 0.0, "progress"_a = py::none(),
+      R"(Bakes the signed distance from a triangle mesh, positive outside, into the grid 'mean' of a new .vdb file.
+
+vertices (N, 3), triangles (M, 3) of indices, facing outwards (a mesh that is inside out as a whole is turned). The nodes cover
+the mesh's bounds with `margin` around them, `resolution` of them along the longest side. An open mesh, or one that meets
+itself, is closed where its generalized winding number is 1/2. progress(fraction) may return False to cancel.
+
+Returns dict(voxel_size, origin (3,), resolution (3,), closed, open_edges, meets_itself, seconds), or None where cancelled (then no file
+is written). closed: without open edges and not meeting itself, so that the distance is exact at every node. ValueError: no triangle with an area,
+indices out of range, coordinates not finite, a mesh that encloses nothing, or is thinner than a voxel everywhere.)");
 }
 
 }  // namespace gpis
