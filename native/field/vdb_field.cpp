@@ -42,7 +42,8 @@ void check_values(const GridType& grid, const std::string& name, GridMeaning mea
 }
 
 template <class GridType>
-FieldPtr make_field(const GridType& grid, const std::string& name, GridMeaning meaning) {
+FieldPtr make_field(const GridType& grid, const Affine& map, const std::string& name,
+                    GridMeaning meaning) {
   const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
   if (box.empty()) refuse("", name, " is empty: no voxel is active.");
   check_values(grid, name, meaning);
@@ -76,7 +77,6 @@ FieldPtr make_field(const GridType& grid, const std::string& name, GridMeaning m
     refuse("", name, " cannot be used: ", e.what());
   }
 
-  const Affine map = index_to_object(grid);
   const double background = read(grid.background());
   const Vec3 first{double(low.x()), double(low.y()), double(low.z())};
   const Vec3 diagonal{map.linear.row[0].x, map.linear.row[1].y, map.linear.row[2].z};
@@ -94,10 +94,11 @@ FieldPtr make_field(const GridType& grid, const std::string& name, GridMeaning m
 FieldPtr load_vdb_field(const std::string& path, const std::string& grid, GridMeaning meaning) {
   const auto opened = open_vdb_grid(path, grid);
   const std::string name = quoted(path, grid);
+  const Affine map = index_to_object(path, *opened);
   if (opened->isType<openvdb::FloatGrid>())
-    return make_field(static_cast<const openvdb::FloatGrid&>(*opened), name, meaning);
+    return make_field(static_cast<const openvdb::FloatGrid&>(*opened), map, name, meaning);
   if (opened->isType<openvdb::DoubleGrid>())
-    return make_field(static_cast<const openvdb::DoubleGrid&>(*opened), name, meaning);
+    return make_field(static_cast<const openvdb::DoubleGrid&>(*opened), map, name, meaning);
   refuse("", name, " holds ", opened->valueType(),
          " values; a scalar field takes float or double ones.");
 }

@@ -72,12 +72,12 @@ std::vector<VdbGridInfo> vdb_grids(const std::string& path) {
     info.name = name;
     info.type = grid->valueType();
     const openvdb::CoordBBox box = grid->evalActiveVoxelBoundingBox();
-    const Affine map = index_to_object(*grid);
-    info.voxel_size = voxel_size_of(map);
     info.resolution = {0, 0, 0};
-    if (!box.empty()) {
-      info.resolution = {box.dim().x(), box.dim().y(), box.dim().z()};
-      info.bounds = bounds_of(box, map);
+    if (!box.empty()) info.resolution = {box.dim().x(), box.dim().y(), box.dim().z()};
+    if (grid->transform().isLinear()) {
+      const Affine map = index_to_object(path, *grid);
+      info.voxel_size = voxel_size_of(map);
+      if (!box.empty()) info.bounds = bounds_of(box, map);
     }
     const auto scalar = [&](const auto& typed) {
       info.background = typed.background();
@@ -120,7 +120,8 @@ VdbArrays read_vdb(const std::string& path, const std::vector<std::string>& name
   openvdb::CoordBBox box;
   for (const std::string& name : names.empty() ? vdb_grid_names(path) : names) {
     grids.push_back(open_vdb_grid(path, name));
-    const Affine a = index_to_object(*grids.front()), b = index_to_object(*grids.back());
+    const Affine a = index_to_object(path, *grids.front()),
+                 b = index_to_object(path, *grids.back());
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j)
         if (i != j && b.linear.row[i][j] != 0)
@@ -137,7 +138,7 @@ VdbArrays read_vdb(const std::string& path, const std::vector<std::string>& name
   if (box.empty()) refuse("\"", path, "\" has no active voxel in the grids asked for.");
 
   VdbArrays out;
-  const Affine map = index_to_object(*grids.front());
+  const Affine map = index_to_object(path, *grids.front());
   out.resolution = {box.dim().x(), box.dim().y(), box.dim().z()};
   out.voxel_size = {map.linear.row[0].x, map.linear.row[1].y, map.linear.row[2].z};
   out.origin = bounds_of({box.min(), box.min()}, map).min;

@@ -12,8 +12,8 @@ struct VdbGridInfo {
   std::string name;
   std::string type;   // "float", "double", "vec3s", ... as OpenVDB calls it
   Index3 resolution;  // nodes of the box of active voxels; zeros where no voxel is active
-  Box3 bounds;        // of these nodes, object space
-  Vec3 voxel_size;
+  Box3 bounds;        // of these nodes, object space; empty where there are none, or in a frustum
+  Vec3 voxel_size;    // zero in a frustum
   std::optional<Range> values;       // of the active voxels; float and double grids
   std::optional<double> background;  // likewise
 };

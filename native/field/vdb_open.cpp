@@ -37,14 +37,6 @@ void fill_level_set(openvdb::GridBase& grid) {
   static_cast<GridType&>(grid).tree().root().setBackground(outside, /*updateChildNodes=*/false);
 }
 
-void prepare(const std::string& path, openvdb::GridBase& grid) {
-  if (!grid.transform().isLinear())
-    refuse("Grid '", grid.getName(), "' of \"", path,
-           "\" lies in a perspective frustum; only affine transforms can be read: resample it.");
-  fill_level_set<openvdb::FloatGrid>(grid);
-  fill_level_set<openvdb::DoubleGrid>(grid);
-}
-
 std::vector<std::string> names_in(const openvdb::io::File& file) {
   std::vector<std::string> names;
   for (auto name = file.beginName(); name != file.endName(); ++name)
@@ -67,13 +59,17 @@ openvdb::GridBase::Ptr open_vdb_grid(const std::string& path, const std::string&
              ".");
     }
     auto grid = file.readGrid(name);
-    prepare(path, *grid);
+    fill_level_set<openvdb::FloatGrid>(*grid);
+    fill_level_set<openvdb::DoubleGrid>(*grid);
     return grid;
   });
 }
 
 // OpenVDB maps row vectors.
-Affine index_to_object(const openvdb::GridBase& grid) {
+Affine index_to_object(const std::string& path, const openvdb::GridBase& grid) {
+  if (!grid.transform().isLinear())
+    refuse("Grid '", grid.getName(), "' of \"", path,
+           "\" lies in a perspective frustum; only affine transforms can be read: resample it.");
   const openvdb::Mat4d m = grid.transform().baseMap()->getAffineMap()->getMat4();
   Affine a;
   for (int i = 0; i < 3; ++i) {

@@ -15,8 +15,8 @@ std::vector<std::string> vdb_grid_names(const std::string& path);
 // name that is not there, and a transform that is not affine.
 openvdb::GridBase::Ptr open_vdb_grid(const std::string& path, const std::string& name);
 
-// The map from index to object space.
-Affine index_to_object(const openvdb::GridBase& grid);
+// The map from index to object space. Refuses one that is not affine.
+Affine index_to_object(const std::string& path, const openvdb::GridBase& grid);
 
 // Makes OpenVDB's own exceptions std::invalid_argument with the path. `doing`: "read" or "written".
 template <class Action>
