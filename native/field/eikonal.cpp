@@ -28,7 +28,7 @@ void solve_eikonal(std::vector<float>& f, const std::vector<char>& fixed, const 
   const std::size_t stride[3] = {static_cast<std::size_t>(n[1]) * n[2],
                                  static_cast<std::size_t>(n[2]), 1};
   std::vector<double> u(f.size());
-  for (std::size_t i = 0; i < f.size(); ++i) u[i] = fixed[i] ? std::abs(f[i]) : kFar;
+  for (std::size_t i = 0; i < f.size(); ++i) u[i] = std::abs(f[i]);
 
   double change = h;
   for (int sweep = 0; sweep < 8 * kRounds && (sweep % 8 != 0 || change > 1e-6 * h); ++sweep) {

@@ -71,9 +71,12 @@ GridField::Line::Line(const GridField& field, const Vec3& o, const Vec3& d) : fi
       std::max({std::abs(direction_.x), std::abs(direction_.y), std::abs(direction_.z)});
   unit_ = 1 / fastest;
   sliver_ = 1e-10 * unit_ + 1e-15 * std::abs(anchor_t_);
-  // A ray this close to parallel with a face does not cross it inside any grid that can be stored.
-  for (int i = 0; i < 3; ++i)
-    inverse_[i] = std::abs(direction_[i]) > 1e-14 * fastest ? 1 / direction_[i] : 0.0;
+  // A ray this close to parallel with a face counts as parallel: it does not cross it inside any
+  // grid that can be stored.
+  for (int i = 0; i < 3; ++i) {
+    if (std::abs(direction_[i]) <= 1e-14 * fastest) direction_[i] = 0;
+    inverse_[i] = direction_[i] != 0 ? 1 / direction_[i] : 0.0;
+  }
   enter(anchor_t_, anchor_t_);
 }
 

@@ -88,7 +88,7 @@ double winding_slope(const std::vector<OpenEdge>& edges, const Vec3& p) {
 
 // True if the surface passes through the middle of the triangle: w exceeds ½ behind it and not
 // before it.
-bool on_surface(const TriangleTree& tree, const Triangle& t) {
+bool is_on_surface(const TriangleTree& tree, const Triangle& t) {
   const Vec3 c = (t[0] + t[1] + t[2]) / 3, n = cross(t[1] - t[0], t[2] - t[0]);
   const Vec3 step = n * (1e-3 / std::sqrt(length(n)));
   return tree.winding_number(c - step) > 0.5 && tree.winding_number(c + step) <= 0.5;
@@ -151,20 +151,17 @@ std::optional<MeshBake> bake_mesh_distance(const std::vector<Vec3>& vertices,
         (mesh.bounds.min[axis] + mesh.bounds.max[axis] - (bake.n[axis] - 1) * bake.h) / 2;
   }
   const auto& n = bake.n;
-  const TriangleTree all(mesh.triangles);
-  std::vector<char> keep(mesh.triangles.size());
-  tbb::parallel_for(std::size_t{0}, keep.size(),
-                    [&](std::size_t i) { keep[i] = on_surface(all, mesh.triangles[i]); });
-  std::vector<Triangle> kept;
-  for (std::size_t i = 0; i < keep.size(); ++i)
-    if (keep[i]) kept.push_back(mesh.triangles[i]);
-  const MeshBake report{n, bake.h, bake.origin, mesh.open_edges.size(), kept.size() < keep.size()};
-  const bool simple = mesh.open_edges.empty() && !report.meets_itself;
-  if (kept.empty())
+  const TriangleTree tree(mesh.triangles);
+  std::atomic<std::size_t> on_surface = 0;
+  tbb::parallel_for(std::size_t{0}, mesh.triangles.size(),
+                    [&](std::size_t i) { on_surface += is_on_surface(tree, mesh.triangles[i]); });
+  if (on_surface == 0)
     refuse(
         "The mesh encloses nothing: seen from everywhere it covers less than half of all "
         "directions. Give it thickness or close it.");
-  const TriangleTree surface(kept);
+  const MeshBake report{n, bake.h, bake.origin, mesh.open_edges.size(),
+                        on_surface < mesh.triangles.size()};
+  const bool simple = mesh.open_edges.empty() && !report.meets_itself;
 
   // Distance to the triangles. The neighbour's plus one voxel is a bound to start from.
   std::vector<float> f(static_cast<std::size_t>(n[0]) * n[1] * n[2]);
@@ -172,7 +169,7 @@ std::optional<MeshBake> bake_mesh_distance(const std::vector<Vec3>& vertices,
   if (!bake.rows(0, 0.5, [&](int i, int j) {
         double bound = far;
         for (int k = 0; k < n[2]; ++k) {
-          const double d = surface.distance(bake.point(i, j, k), bound);
+          const double d = tree.distance(bake.point(i, j, k), bound);
           f[bake.index(i, j, k)] = static_cast<float>(d);
           bound = d + 1.001 * bake.h;
         }
@@ -187,7 +184,7 @@ std::optional<MeshBake> bake_mesh_distance(const std::vector<Vec3>& vertices,
         for (int k = 0; k < n[2]; ++k) {
           float& value = f[bake.index(i, j, k)];
           if (!simple || k == 0 || value <= 1.001 * bake.h) {
-            const double w = all.winding_number(bake.point(i, j, k));
+            const double w = tree.winding_number(bake.point(i, j, k));
             inside = w > 0.5;
             if (!simple) winding[bake.index(i, j, k)] = static_cast<float>(w);
           }
@@ -213,14 +210,17 @@ std::optional<MeshBake> bake_mesh_distance(const std::vector<Vec3>& vertices,
           }
         }))
       return std::nullopt;
-    if (!mesh.open_edges.empty() && !bake.rows(0.95, 0.98, [&](int i, int j) {
+    if (!bake.rows(0.95, 0.98, [&](int i, int j) {
           for (int k = 0; k < n[2]; ++k) {
             const std::size_t at = bake.index(i, j, k);
-            if (!fixed[at]) continue;
-            const double slope = winding_slope(mesh.open_edges, bake.point(i, j, k));
-            const double sheet = slope > 0 ? std::abs(winding[at] - 0.5) / slope : kInfinity;
-            f[at] =
-                std::copysign(static_cast<float>(std::min<double>(std::abs(f[at]), sheet)), f[at]);
+            double d = std::abs(f[at]);
+            if (fixed[at] && !mesh.open_edges.empty()) {
+              const double slope = winding_slope(mesh.open_edges, bake.point(i, j, k));
+              if (slope > 0) d = std::min(d, std::abs(winding[at] - 0.5) / slope);
+            } else if (!fixed[at] && report.meets_itself) {
+              d = far;  // parts of triangles that lie inside bound nothing
+            }
+            f[at] = std::copysign(static_cast<float>(d), f[at]);
           }
         }))
       return std::nullopt;

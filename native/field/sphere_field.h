@@ -28,13 +28,11 @@ class SphereField final : public Field {
   class Line final : public FieldLine {
    public:
     Line(const SphereField& field, const Vec3& o, const Vec3& d)
-        : from_center_(o - field.center_),
-          direction_(d),
-          radius_(field.radius_),
-          speed2_(dot(d, d)),
-          nearest_(-dot(from_center_, d) / speed2_) {
-      const Vec3 miss = from_center_ + d * nearest_;
-      miss2_ = dot(miss, miss);
+        : direction_(d), radius_(field.radius_), speed2_(dot(d, d)) {
+      const Vec3 from_center = o - field.center_;
+      nearest_ = -dot(from_center, d) / speed2_;
+      miss_ = from_center + d * nearest_;
+      miss2_ = dot(miss_, miss_);
       has_break_ = miss2_ < radius_ * radius_ / 4;
     }
 
@@ -57,14 +55,14 @@ class SphereField final : public Field {
       return std::clamp(nearest_ - std::sqrt((r * r - miss2_) / speed2_), t, t_end);
     }
     FieldSample sample(double t) const override {
-      const Vec3 q = from_center_ + direction_ * t;
+      const Vec3 q = miss_ + direction_ * (t - nearest_);
       const double r = length(q);
       if (r > 0) return {r - radius_, q / r};
       return {-radius_, normalize(direction_) * (after_ ? 1 : -1)};
     }
 
    private:
-    Vec3 from_center_, direction_;
+    Vec3 direction_, miss_;
     double radius_, speed2_, nearest_, miss2_;
     bool has_break_, after_ = false;
   };

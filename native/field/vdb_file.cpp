@@ -53,12 +53,11 @@ void put(openvdb::GridPtrVec& out, const VdbArrays& arrays, const VdbArray& arra
           voxels.setValueOn({i, j, k}, Value(v[0], v[1], v[2]));
       }
   grid->setName(array.name);
-  openvdb::Mat4d map = openvdb::Mat4d::identity();
-  for (int i = 0; i < 3; ++i) {
-    map(i, i) = arrays.voxel_size[i];
-    map(3, i) = arrays.origin[i];  // OpenVDB maps row vectors
-  }
-  grid->setTransform(openvdb::math::Transform::createLinearTransform(map));
+  const Vec3 h = arrays.voxel_size, o = arrays.origin;
+  auto transform = openvdb::math::Transform::createLinearTransform(1.0);
+  transform->postScale(openvdb::Vec3d(h.x, h.y, h.z));
+  transform->postTranslate(openvdb::Vec3d(o.x, o.y, o.z));
+  grid->setTransform(transform);
   out.push_back(grid);
 }
 
