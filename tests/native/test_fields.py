@@ -177,9 +177,7 @@ def test_pieces_are_cubic_to_smooth_scale(name):
             m, (v0, s0), (v1, s1) = a + h / 2, line.evaluate(a), line.evaluate(a + h)
             error = abs((v0 + v1) / 2 + h * (s0 - s1) / 8 - line.evaluate(m)[0])
             assert error <= (
-                1e-10 * max(1, field.lipschitz)
-                if np.isinf(field.smooth_scale)
-                else 0.03 * size * max(1, field.lipschitz)
+                1e-10 * max(1, field.lipschitz) if np.isinf(field.smooth_scale) else 0.03 * size * max(1, field.lipschitz)
             )
 
 

@@ -103,7 +103,7 @@ def test_boxes_that_overlap_have_one_surface(tmp_path):
     assert np.all(f[exact < -1e-6] < 0)
     # Deep inside no wall is left where the boxes meet: one box's own distance is a lower bound of the depth.
     deep = exact < -2 * h
-    assert np.all(f[deep] < exact[deep] + 0.75 * h)
+    assert np.all(f[deep] < exact[deep] + h) and np.mean(f[deep] < exact[deep] + 0.5 * h) > 0.95
 
 
 def test_progress_and_cancel(tmp_path):

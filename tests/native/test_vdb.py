@@ -27,6 +27,11 @@ def grid(name, kind=openvdb.FloatGrid, background=0, values=None, origin=(0, 0, 
 
 sphere = openvdb.createLevelSetSphere(radius=1.0, center=(0.5, 0, 0), voxelSize=0.05, halfWidth=3.0)
 sphere.name = "sphere"
+unfilled = openvdb.FloatGrid(0.15)  # the same band, inside and outside not told apart
+unfilled.name, unfilled.gridClass, unfilled.transform = "unfilled", sphere.gridClass, sphere.transform
+writer = unfilled.getAccessor()
+for voxel in sphere.citerOnValues():
+    writer.setValueOn(voxel.min, voxel.value)
 rotated = grid("rotated")
 rotated.transform = openvdb.createLinearTransform(0.5)
 rotated.transform.postRotate(0.4, openvdb.Axis.Z)
@@ -43,7 +48,7 @@ half = grid("half"); half.saveFloatAsHalf = True
 frustum = grid("frustum")
 frustum.transform = openvdb.createFrustumTransform((0, 0, 0), (1, 1, 1), 0.5, 1.0)
 empty = openvdb.FloatGrid(3.0); empty.name = "empty"
-grids = [sphere, rotated, slab, tiles, half, frustum, empty, grid("double", openvdb.DoubleGrid, 7.0),
+grids = [sphere, unfilled, rotated, slab, tiles, half, frustum, empty, grid("double", openvdb.DoubleGrid, 7.0),
          nan, grid("count", openvdb.Int32Grid),
          grid("negative", values=1 - np.arange(24.0).reshape(2, 3, 4)), grid("thin", values=np.ones((3, 1, 3)))]
 openvdb.write(sys.argv[1], grids=grids)
@@ -57,8 +62,9 @@ def blender_file(tmp_path_factory):
     return path
 
 
-def test_a_level_set_has_its_inside_and_outside(blender_file):
-    f = gn.VdbField(blender_file, "sphere")
+@pytest.mark.parametrize("name", ["sphere", "unfilled"])
+def test_a_level_set_has_its_inside_and_outside(blender_file, name):
+    f = gn.VdbField(blender_file, name)
     x = np.random.default_rng(1).uniform(-2, 2, (4000, 3))
     exact = np.clip(np.linalg.norm(x - [0.5, 0, 0], axis=1) - 1, -0.15, 0.15)
     assert np.abs(f(x) - exact).max() < 0.05  # the steps at the ends of the band are one voxel wide
