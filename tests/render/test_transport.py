@@ -132,9 +132,9 @@ def test_standard_sphere_is_that_of_the_paper(seed, full_size):
 
 @pytest.mark.stats
 def test_renewal_loses_no_paths(seed):
-    """The paper's renderer drops the rays that start inside and gets .738. With the flux-weighted slope (definitions B3)
-    Renewal keeps them, and forgetting the slope changes this scene by less than .001. Memory none forgets that it stands
-    on the surface: it starts somewhere in f > 0, meets the surface more often, and is darker."""
+    """The paper's renderer drops the rays that start inside and gets .738. With the flux-weighted slope (definitions
+    B3) Renewal keeps them, and forgetting the slope changes this scene by less than .001. Memory none forgets that it
+    stands on the surface: it starts somewhere in f > 0, meets the surface more often, and is darker."""
     renewal, error = standard_sphere("renewal", 32, seed)
     assert np.all(np.abs(renewal - REFERENCE) < 3 * np.hypot(error, REFERENCE_ERROR) + 0.002), (renewal, error)
     forgetful, _ = standard_sphere("none", 32, seed)
