@@ -26,11 +26,13 @@ def path_of(data):
 
 
 def grids(path):
-    """The float grids of a .vdb: dicts of name, type, min, max, voxel_size, value_range."""
+    """The scalar grids of a .vdb that hold anything, as the native `vdb_grids` describes them."""
     stat = os.stat(path)
     key = (path, stat.st_mtime_ns, stat.st_size)
     if key not in _grids:
-        _grids[key] = native().vdb_grids(path)
+        _grids[key] = [
+            grid for grid in native().vdb_grids(path) if grid["type"] in {"float", "double"} and grid["min"] is not None
+        ]
     return _grids[key]
 
 

@@ -102,8 +102,10 @@ def note(volume_object, report):
     """What an artist should know about a bake."""
     name = volume_object.gpis.source.name
     text = f'Signed distance of "{name}": voxels of {report["voxel_size"]:.3g}'
-    if not report["closed"]:
-        text += ". The mesh is open or meets itself: it was closed by its winding number"
+    reasons = [f"has {report['open_edges']} open edges"] if report["open_edges"] else []
+    reasons += ["meets itself"] if report["meets_itself"] else []
+    if reasons:
+        text += f". The mesh {' and '.join(reasons)}: it was closed by its winding number"
     return text + "."
 
 

@@ -1,0 +1,224 @@
+"""GPIS objects: from a mesh, from a Volume object, and what is kept of them in the file."""
+
+import importlib
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from . import support
+
+BUNNY = Path(__file__).parents[3] / "shared" / "data" / "gpis-light-transport" / "bunny.vdb"
+
+
+@pytest.fixture
+def stage(empty_scene):
+    support.settings(empty_scene, width=48, height=36, samples=32)
+    support.world(empty_scene, (1, 1, 1))
+    support.camera(empty_scene, (0, -6, 0))
+    return empty_scene
+
+
+@pytest.fixture
+def describe(extension):
+    """The GPIS objects of the description and the warnings, as the scene stands."""
+    sync = importlib.import_module(extension + ".sync")
+
+    def describe():
+        bpy.context.view_layer.update()
+        state = sync.describe(bpy.context.evaluated_depsgraph_get(), 48, 36)
+        return [entry for entry in state.description["objects"] if entry["type"] == "gpis"], state.warnings
+
+    return describe
+
+
+@pytest.fixture
+def ball(stage):
+    """A GPIS of a black sphere of radius 1, by the operator."""
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24)
+    bpy.context.object.data.materials.append(support.diffuse("Black", (0, 0, 0)))
+    assert bpy.ops.gpis.make(resolution=48) == {"FINISHED"}
+    return bpy.context.object
+
+
+def coverage(stage, path):
+    """Per pixel: how much of the white world a black body hides."""
+    return 1 - support.picture(stage, path)[..., 0]
+
+
+def test_make_puts_a_volume_in_place_of_the_mesh(ball):
+    mesh = ball.gpis.source
+    assert ball.type == "VOLUME" and ball.gpis.enabled and ball.display_type == "BOUNDS"
+    assert ball.gpis.mean_grid == "mean" and Path(bpy.path.abspath(ball.data.filepath)).is_file()
+    assert mesh.hide_render and mesh.display_type == "WIRE" and ball.parent == mesh
+    assert [material.name for material in ball.data.materials] == ["Black"]
+    # Of an object two metres wide.
+    assert ball.gpis.sigma == pytest.approx(0.04, rel=1e-3) and ball.gpis.length_scale == pytest.approx(0.2, rel=1e-3)
+    assert ball.gpis.bake_margin >= 4 * ball.gpis.sigma
+
+
+def test_small_deviation_is_the_mesh(stage, ball, tmp_path):
+    """σ → 0: the picture is that of the sphere in Cycles, to a fraction of a voxel."""
+    ball.gpis.sigma = 1e-3
+    stage.render.engine = "GPIS"
+    fuzzy = coverage(stage, tmp_path)
+    ball.hide_render, ball.gpis.source.hide_render = True, False
+    exact = 1 - support.picture(stage, tmp_path, "CYCLES")[..., 0]
+    assert 0.1 < exact.mean() < 0.5
+    assert abs(fuzzy.mean() / exact.mean() - 1) < 0.02
+    assert np.abs(fuzzy - exact).mean() < 0.01
+
+
+def test_deviation_blurs_the_silhouette(stage, ball, tmp_path):
+    """The larger σ, the more pixels that are neither covered nor free; the middle stays covered."""
+    soft = []
+    for sigma in (0.005, 0.05, 0.2):
+        ball.gpis.sigma = sigma
+        ball.gpis.length_scale = 0.3
+        picture = coverage(stage, tmp_path)
+        assert picture[16:20, 22:26].min() > 0.99
+        soft.append(np.mean((picture > 0.1) & (picture < 0.9)))
+    assert soft[0] < soft[1] < soft[2]
+
+
+def test_object_transform_moves_the_process(stage, ball, tmp_path):
+    """Turned, scaled and moved is the same as the mesh turned, scaled and moved."""
+    ball.gpis.sigma = 1e-3
+    mesh = ball.gpis.source
+    mesh.location, mesh.scale, mesh.rotation_euler = (0.6, 0, -0.4), (1.2, 0.5, 0.4), (0.3, 0.5, 0.2)
+    ours = coverage(stage, tmp_path)
+    ball.hide_render, mesh.hide_render = True, False
+    cycles = 1 - support.picture(stage, tmp_path, "CYCLES")[..., 0]
+    assert np.abs(ours - cycles).mean() < 0.01
+
+
+def test_instances_of_a_gpis(stage, ball, tmp_path):
+    one = coverage(stage, tmp_path).sum()
+    group = bpy.data.collections.new("Group")
+    mesh = ball.gpis.source
+    mesh.scale = (0.4, 0.4, 0.4)
+    for obj in (ball, mesh):
+        stage.collection.objects.unlink(obj)
+        group.objects.link(obj)
+    for x in (-1, 1):
+        empty = support.link(stage, "Instance", None, location=(x, 0, 0))
+        empty.instance_type, empty.instance_collection = "COLLECTION", group
+    assert coverage(stage, tmp_path).sum() == pytest.approx(2 * 0.16 * one, rel=0.1)
+
+
+@pytest.mark.parametrize("memory", ["NONE", "RENEWAL", "RENEWAL_PLUS"])
+def test_memories_reach_the_renderer(ball, describe, memory):
+    ball.gpis.memory = memory
+    (entry,), _ = describe()
+    assert entry["memory"] == {"NONE": "none", "RENEWAL": "renewal", "RENEWAL_PLUS": "renewal+"}[memory]
+
+
+def test_open_mesh_is_closed_with_a_note(stage, extension):
+    operators = importlib.import_module(extension + ".bake.operators")
+    bpy.ops.mesh.primitive_monkey_add()
+    obj, report = operators.make(bpy.context, bpy.context.object, resolution=32)
+    assert not report["closed"] and "closed by its winding number" in operators.note(obj, report)
+    bpy.ops.mesh.primitive_cube_add()
+    obj, report = operators.make(bpy.context, bpy.context.object, resolution=32)
+    assert report["closed"] and "winding" not in operators.note(obj, report)
+
+
+def test_modifiers_are_baked_and_bake_again_is_a_new_file(stage, ball, tmp_path):
+    before = ball.data.filepath
+    first = coverage(stage, tmp_path).sum()
+    ball.gpis.source.modifiers.new("Cast", "CAST").cast_type = "CUBOID"
+    ball.gpis.source.modifiers["Cast"].factor = 1.0
+    bpy.context.view_layer.objects.active = ball
+    assert bpy.ops.gpis.rebake(resolution=48) == {"FINISHED"}
+    assert ball.data.filepath != before and Path(bpy.path.abspath(before)).is_file()
+    assert coverage(stage, tmp_path).sum() > 1.05 * first
+
+
+def bunny(stage):
+    if not BUNNY.is_file():
+        pytest.skip("the shared data files are not there")
+    data = bpy.data.volumes.new("Bunny")
+    data.filepath = str(BUNNY)
+    obj = support.link(stage, "Bunny", data, rotation=(0.7071, 0.7071, 0, 0))
+    data.materials.append(support.diffuse("Black", (0, 0, 0)))
+    return obj
+
+
+def test_bunny_as_a_volume_object(stage, tmp_path):
+    obj = bunny(stage)
+    settings = obj.gpis
+    settings.enabled = True
+    assert settings.mean_grid == "mean"
+    assert "variance" not in settings.sigma_grid and settings.sigma_meaning == "UNSET"  # never guessed
+    settings.sigma_source, settings.sigma_grid = "GRID", "variance"
+    assert "standard deviation σ or the variance σ²" in support.failure(stage, tmp_path)
+    settings.sigma_meaning, settings.sigma_factor, settings.length_scale = "STANDARD_DEVIATION", 0.5, 0.5
+    deviation = coverage(stage, tmp_path)
+    assert 0.05 < deviation.mean() < 0.6 and deviation.max() > 0.99
+    # The same numbers taken for σ² are a larger σ: a softer picture.
+    settings.sigma_meaning = "VARIANCE"
+    variance = coverage(stage, tmp_path)
+    soft = [np.mean((picture > 0.1) & (picture < 0.9)) for picture in (deviation, variance)]
+    assert soft[1] > soft[0]
+
+
+def test_grid_lists_hold_the_grids_of_the_file(stage, extension):
+    volume = importlib.import_module(extension + ".volume")
+    assert sorted(volume.grid_names(bunny(stage).data)) == ["mean", "variance"]
+
+
+def test_volume_without_gpis_is_left_out_and_said(ball, describe):
+    ball.gpis.enabled = False
+    entries, warnings = describe()
+    assert not entries and any('"Sphere GPIS" is left out' in sentence for sentence in warnings)
+
+
+def test_sigma_beyond_the_margin_is_said(ball, describe):
+    assert describe()[1] == []
+    ball.gpis.sigma = 1.0
+    assert any("cut off at the bounds" in sentence for sentence in describe()[1])
+
+
+def test_save_and_reload(stage, ball, tmp_path):
+    ball.gpis.sigma, ball.gpis.length_scale, ball.gpis.memory = 0.07, 0.33, "RENEWAL"
+    stage.gpis.samples, stage.gpis.seed = 77, 5
+    stage.view_layers[0].gpis.use_pass_variance = True
+    blend = tmp_path / "first.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    scene, ball = bpy.context.scene, bpy.data.objects["Sphere GPIS"]
+    assert ball.data.filepath.startswith("//first_gpis/")
+    assert Path(bpy.path.abspath(ball.data.filepath)).is_file()
+    assert (ball.gpis.sigma, ball.gpis.length_scale) == pytest.approx((0.07, 0.33))
+    assert ball.gpis.memory == "RENEWAL" and ball.gpis.source.name == "Sphere" and ball.gpis.enabled
+    assert (scene.gpis.samples, scene.gpis.seed) == (77, 5) and scene.render.engine == "GPIS"
+    assert scene.view_layers[0].gpis.use_pass_variance
+    assert coverage(scene, tmp_path).max() > 0.99
+
+
+def test_old_versions_are_collected_and_backups_stay_whole(stage, ball, tmp_path):
+    """Four bakes, three saves and a load: what the .blend, its backup or undo can point at is kept, the rest is not."""
+    blend = tmp_path / "scene.blend"
+    folder = tmp_path / "scene_gpis"
+    bpy.context.view_layer.objects.active = ball
+    for _ in range(2):
+        bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+        bpy.ops.gpis.rebake(resolution=16)
+    bpy.ops.gpis.rebake(resolution=16)
+    used = Path(bpy.path.abspath(ball.data.filepath))
+    assert len(list(folder.iterdir())) == 4, "undo may want any version of this session"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    assert len(list(folder.iterdir())) == 4
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    kept = sorted(folder.iterdir())
+    assert len(kept) == 2 and kept[-1] == used
+
+
+def test_save_as_gives_the_copy_files_of_its_own(stage, ball, tmp_path):
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    first = Path(bpy.path.abspath(ball.data.filepath))
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "b.blend"))
+    second = Path(bpy.path.abspath(ball.data.filepath))
+    assert first.parent.name == "a_gpis" and second.parent.name == "b_gpis"
+    assert first.read_bytes() == second.read_bytes()
