@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from . import nodes
 from .state import array
 
 
@@ -14,7 +15,7 @@ def add(sync, obj, matrix_world):
         sync.warn(f'Light "{obj.name}" is rendered normalised: the GPIS engine has no other way. Switch Normalize on.')
     if power <= 0 or not np.any(color > 0):
         return  # gives no light
-    if not light.use_shadow if hasattr(light, "use_shadow") else False:
+    if not light.use_shadow:
         sync.warn(f'Light "{obj.name}" casts shadows all the same: the GPIS engine has no light without shadows.')
     scale = np.linalg.norm(matrix[:3, :3], axis=0)
     placed = matrix.copy()
@@ -45,11 +46,10 @@ def _color(sync, obj):
     color = np.array(light.color, dtype=np.float64)
     if getattr(light, "use_temperature", False):
         color = color * np.array(light.temperature_color, dtype=np.float64)
-    if not light.use_nodes or light.node_tree is None:
+    tree = nodes.tree_of(light)
+    if tree is None:
         return color, 1.0
-    output = light.node_tree.get_output_node("CYCLES")
-    links = output.inputs["Surface"].links if output else ()
-    node = links[0].from_node if links else None
+    node = nodes.shader_of(tree)
     if node is None or node.type != "EMISSION" or any(socket.is_linked for socket in node.inputs):
         sync.warn(f'Light "{obj.name}": its nodes are not read, only one Emission node with plain values is.')
         return color, 1.0

@@ -41,9 +41,10 @@ def _name(sync, material):
 
 def describe(sync, material):
     owner = f'Material "{material.name}"'
-    if material.node_tree is None or not material.use_nodes:
+    tree = nodes.tree_of(material)
+    if tree is None:
         return {"type": "lambert", "color": tuple(material.diffuse_color[:3])}  # as Cycles shades it
-    node = nodes.shader_of(material.node_tree)
+    node = nodes.shader_of(tree)
     if node is None:
         sync.warn(f"{owner} has nothing on its Surface: it is rendered black.")
         return {"type": "lambert", "color": (0.0, 0.0, 0.0)}

@@ -1,5 +1,14 @@
 """Reading shader nodes: the few that the engine knows, and a sentence about every other."""
 
+import bpy
+
+
+def tree_of(owner):
+    """The node tree of a material, world or light, None where it has none or (before 5.0) does not use it."""
+    # Since 5.0 the switch is always on for materials and worlds, and reading it warns of its removal.
+    in_use = isinstance(owner, bpy.types.Light) or bpy.app.version < (5, 0)
+    return None if in_use and not owner.use_nodes else owner.node_tree
+
 
 def shader_of(tree):
     """The node that is linked to the Surface of the active output, or None."""

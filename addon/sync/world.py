@@ -12,9 +12,10 @@ def describe(sync):
     if world is None:
         return {"color": (0.0, 0.0, 0.0), "strength": 1.0}
     owner = f'World "{world.name}"'
-    if not world.use_nodes or world.node_tree is None:
+    tree = nodes.tree_of(world)
+    if tree is None:
         return {"color": tuple(world.color), "strength": 1.0}
-    background = nodes.shader_of(world.node_tree)
+    background = nodes.shader_of(tree)
     if background is None:
         return {"color": (0.0, 0.0, 0.0), "strength": 1.0}
     if background.type != "BACKGROUND":

@@ -49,9 +49,9 @@ def _draw_fields(layout, context):
         layout.label(text=str(error), icon="ERROR")
     layout.prop(settings, "mean_grid", icon="VOLUME_DATA")
     column = layout.column()
-    column.prop(settings, "sigma_source", expand=True)
+    column.row().prop(settings, "sigma_source", expand=True)
     if settings.sigma_source == "CONSTANT":
-        column.prop(settings, "sigma")
+        column.prop(settings, "sigma", text="Deviation σ")
         _draw_world(column, context, settings.sigma)
     else:
         column.prop(settings, "sigma_grid", icon="VOLUME_DATA")
@@ -71,16 +71,18 @@ def _draw_kernel(layout, context):
 
 
 def _draw_world(layout, context, length):
-    """The length that is typed is in object units; beside it what that is in the world."""
-    system = context.scene.unit_settings.system
+    """The length that is typed is in object units; under it what that is in the world, along the axes."""
     lengths = world_lengths(context.object.matrix_world, length)
-    if np.ptp(lengths) <= 1e-4 * lengths.max():
-        lengths = lengths[:1]
-    texts = [bpy.utils.units.to_string(system, "LENGTH", float(entry), precision=3) for entry in lengths]
+    low, high = (_length(context, entry) for entry in (lengths.min(), lengths.max()))
     row = layout.row()
+    row.alignment = "RIGHT"
     row.active = False
-    row.label(text="")
-    row.label(text="in the world " + " × ".join(texts))
+    row.label(text=f"World: {low}" if low == high else f"World: {low} to {high}")
+
+
+def _length(context, value):
+    units = context.scene.unit_settings
+    return bpy.utils.units.to_string(units.system, "LENGTH", float(value) * units.scale_length, precision=3)
 
 
 def _draw_source(layout, settings):
