@@ -20,9 +20,9 @@ INSTALLED = "bl_ext.user_default.gpis"
 
 # From crisp to fuzzy: standard deviation and length scale in units of an object two metres wide, colour, place, turn.
 FIGURES = (
-    ("Crisp", 0.012, 0.05, (0.70, 0.24, 0.08), (-2.35, 0.0), 22),
-    ("Rough", 0.05, 0.12, (0.70, 0.24, 0.08), (0.0, 0.35), 2),
-    ("Soft", 0.16, 0.16, (0.70, 0.24, 0.08), (2.4, 0.0), -20),
+    ("Crisp", 0.012, 0.06, (0.70, 0.24, 0.08), (-2.35, 0.0), 22),
+    ("Rough", 0.05, 0.16, (0.70, 0.24, 0.08), (0.0, 0.35), 2),
+    ("Soft", 0.15, 0.28, (0.70, 0.24, 0.08), (2.4, 0.0), -20),
 )
 SUN = Euler((math.radians(58), 0, math.radians(-52)))  # where the sun shines from, and the bright side of the sky
 
@@ -31,8 +31,8 @@ def arguments():
     own = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:] if not bpy.app.binary_path else []
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--output", type=Path, default=ROOT / "out", help="folder of the three files")
-    parser.add_argument("--width", type=int, default=640, help="pixels; the height is 9/16 of it")
-    parser.add_argument("--seconds", type=float, default=45, help="time limit of the render")
+    parser.add_argument("--width", type=int, default=560, help="pixels; the height is 9/16 of it")
+    parser.add_argument("--seconds", type=float, default=50, help="time limit of the render")
     parser.add_argument("--resolution", type=int, default=128, help="grid nodes along the longest side of a figure")
     return parser.parse_args(own)
 
@@ -45,19 +45,10 @@ def enable_addon():
     importlib.import_module("addon").register()
 
 
-def material(name, color, roughness=1.0):
-    """A Principled material; without a name of its own look, it is dull."""
-    result = bpy.data.materials.new(name)
-    result.use_nodes = True
-    principled = result.node_tree.nodes["Principled BSDF"]
-    principled.inputs["Base Color"].default_value = (*color, 1)
-    principled.inputs["Roughness"].default_value = roughness
-    return result
-
-
 def diffuse(name, color):
     result = bpy.data.materials.new(name)
-    result.use_nodes = True
+    if bpy.app.version < (5, 0):
+        result.use_nodes = True
     nodes = result.node_tree.nodes
     shader = nodes.new("ShaderNodeBsdfDiffuse")
     shader.inputs["Color"].default_value = (*color, 1)
@@ -106,10 +97,10 @@ def sky_image(width=512):
     )
     toward_sun = direction @ np.array(SUN.to_matrix() @ Vector((0, 0, 1)))
     up = np.clip(direction[..., 2:], 0, 1)
-    horizon, zenith = np.array([0.80, 0.84, 0.88]), np.array([0.07, 0.19, 0.52])
-    color = zenith + (horizon - zenith) * np.exp(-up * 5)
+    horizon, zenith = np.array([0.66, 0.77, 0.90]), np.array([0.05, 0.16, 0.52])
+    color = zenith + (horizon - zenith) * np.exp(-up * 6)
     color += np.array([1.0, 0.72, 0.45]) * 0.8 * np.exp((toward_sun[..., None] - 1) * 14)
-    color = np.where(direction[..., 2:] < -0.01, np.array([0.42, 0.37, 0.31]), color)
+    color[direction[..., 2] < -0.015] = 0  # under the floor: rays sent there would be lost
     pixels = np.concatenate((color, np.ones((height, width, 1))), axis=-1)
     image = bpy.data.images.new("Sky", width, height, float_buffer=True)
     image.pixels.foreach_set(np.ascontiguousarray(pixels, dtype=np.float32).reshape(-1))
@@ -119,7 +110,8 @@ def sky_image(width=512):
 def add_light(scene):
     world = bpy.data.worlds.new("Sky")
     scene.world = world
-    world.use_nodes = True
+    if bpy.app.version < (5, 0):
+        world.use_nodes = True
     nodes, links = world.node_tree.nodes, world.node_tree.links
     texture = nodes.new("ShaderNodeTexEnvironment")
     texture.image = sky_image()
