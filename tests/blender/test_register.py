@@ -17,7 +17,7 @@ def footprint():
     engines = {
         panel.__name__: frozenset(panel.COMPAT_ENGINES)
         for panel in bpy.types.Panel.__subclasses__()
-        if hasattr(panel, "COMPAT_ENGINES")
+        if panel.is_registered and hasattr(panel, "COMPAT_ENGINES")
     }
     owners = (bpy.types.Scene, bpy.types.ViewLayer, bpy.types.Object, bpy.types.Volume)
     properties = {owner.__name__: set(owner.bl_rna.properties.keys()) for owner in owners}
