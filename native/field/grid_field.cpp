@@ -87,7 +87,7 @@ double GridField::Line::above_until(double t, double t_end, double threshold) co
       t = t < box_in_ ? box_in_ : kInfinity;
       continue;
     }
-    const Step step = locate(t);
+    const Step& step = locate(t);
     const BrickGrid::Brick& brick = field_->grid_->brick_of(step.cell);
     if (brick.min > threshold) {
       t = brick_exit(step);

@@ -115,7 +115,7 @@ class GridField::Line final : public FieldLine {
 
   double next_break(double t) const override {
     if (outside_with_background(t)) return t < box_in_ ? box_in_ : kInfinity;
-    const Step step = locate(t);
+    const Step& step = locate(t);
     const BrickGrid::Brick& brick = field_->grid_->brick_of(step.cell);
     return brick.values < 0 ? brick_exit(step) : step.exit;
   }
@@ -174,14 +174,15 @@ class GridField::Line final : public FieldLine {
   }
 
  private:
-  // Where the ray is just after t: its cell, for each axis the next face it crosses, and when it
-  // leaves the cell. Faces are compared by their times, which depend on the face alone, so that no
-  // rounding can repeat or skip one; faces closer to t than `sliver_` (1e-10 of a cell) count as
-  // crossed.
+  // Where the ray is just after t: its cell, for each axis the next face it crosses and when
+  // (never: infinity), and when it leaves the cell. Faces are compared by their times, which depend
+  // on the face alone, so that no rounding can repeat or skip one; faces closer to t than `sliver_`
+  // (1e-10 of a cell) count as crossed.
   struct Step {
     Index3 cell;
-    Index3 face;  // next face along each axis; -1 or nodes() past the last one
-    double exit;
+    Index3 face;  // -1 or nodes() past the last one
+    double time[3];
+    double exit = -kInfinity;
   };
   Vec3 at(double t) const { return anchor_ + direction_ * (t - anchor_t_); }
   double face_time(int axis, int face) const {
@@ -190,30 +191,32 @@ class GridField::Line final : public FieldLine {
   bool outside_with_background(double t) const {
     return field_->background_ && (t < box_in_ - sliver_ || t >= box_out_ - sliver_);
   }
-  Step locate(double t) const {
-    Step step;
-    step.exit = kInfinity;
-    const Vec3 x = at(t);
-    for (int i = 0; i < 3; ++i) {
-      const int nodes = field_->grid_->nodes()[i];
-      const double clamped = std::clamp(x[i], -1.0, static_cast<double>(nodes));
-      int face;
-      if (inverse_[i] > 0) {
-        face = std::max(static_cast<int>(std::floor(clamped)), 0);
-        while (face < nodes && face_time(i, face) <= t + sliver_) ++face;
-        step.cell[i] = std::clamp(face - 1, 0, nodes - 2);
-      } else if (inverse_[i] < 0) {
-        face = std::min(static_cast<int>(std::ceil(clamped)), nodes - 1);
-        while (face >= 0 && face_time(i, face) <= t + sliver_) --face;
-        step.cell[i] = std::clamp(face, 0, nodes - 2);
-      } else {
-        face = -1;
-        step.cell[i] = cell_of(x[i], nodes);
+  const Step& locate(double t) const {
+    if (t != step_.exit) {  // not on from the last step
+      const Vec3 x = at(t);
+      for (int i = 0; i < 3; ++i) {
+        const int nodes = field_->grid_->nodes()[i];
+        const double clamped = std::clamp(x[i], -1.0, static_cast<double>(nodes));
+        // Rounding by conversion: to plain x86-64 floor is a call.
+        int face = -1;
+        if (inverse_[i] > 0) face = std::max(static_cast<int>(clamped + 1) - 1, 0);
+        if (inverse_[i] < 0) face = std::min(nodes - static_cast<int>(nodes - clamped), nodes - 1);
+        step_.cell[i] = cell_of(x[i], nodes);
+        set_face(i, face);
       }
-      step.face[i] = face;
-      if (face >= 0 && face < nodes) step.exit = std::min(step.exit, face_time(i, face));
     }
-    return step;
+    for (int i = 0; i < 3; ++i)
+      while (step_.time[i] <= t + sliver_) set_face(i, step_.face[i] + (inverse_[i] > 0 ? 1 : -1));
+    step_.exit = std::min({step_.time[0], step_.time[1], step_.time[2]});
+    return step_;
+  }
+  void set_face(int axis, int face) const {
+    const int nodes = field_->grid_->nodes()[axis];
+    step_.face[axis] = face;
+    step_.time[axis] =
+        inverse_[axis] != 0 && face >= 0 && face < nodes ? face_time(axis, face) : kInfinity;
+    if (inverse_[axis] != 0)
+      step_.cell[axis] = std::clamp(inverse_[axis] > 0 ? face - 1 : face, 0, nodes - 2);
   }
   // When the ray leaves the brick of its cell.
   double brick_exit(const Step& step) const {
@@ -242,6 +245,7 @@ class GridField::Line final : public FieldLine {
   double anchor_t_ = 0, unit_, sliver_, box_in_, box_out_;
 
   Cell cell_;
+  mutable Step step_;  // the last one located: where the next one starts from
   double cubic_[4], middle_ = 0;
   Vec3 local_, slope_, gradient_scale_;
 };

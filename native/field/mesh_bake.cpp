@@ -94,40 +94,143 @@ bool is_on_surface(const TriangleTree& tree, const Triangle& t) {
   return tree.winding_number(c - step) > 0.5 && tree.winding_number(c + step) <= 0.5;
 }
 
-struct Bake {
-  Index3 n;
-  double h;
-  Vec3 origin;
-  std::function<bool(double)> progress;
+// The grid of one bake. Its steps return false where `progress` cancelled.
+class Bake {
+ public:
+  // The longest side fits, the others overhang by the same on both ends.
+  Bake(const Mesh& mesh, int resolution, double margin, std::function<bool(double)> progress)
+      : mesh_(mesh), tree_(mesh.triangles), progress_(std::move(progress)) {
+    const Vec3 size = mesh.bounds.max - mesh.bounds.min + Vec3{2, 2, 2} * margin;
+    h_ = max_component(size) / (resolution - 1);
+    for (int i = 0; i < 3; ++i) {
+      n_[i] = std::max(2, static_cast<int>(std::ceil(size[i] / h_ - 1e-6)) + 1);
+      origin_[i] = (mesh.bounds.min[i] + mesh.bounds.max[i] - (n_[i] - 1) * h_) / 2;
+    }
+    far_ = 2 * length(size);
+    f_.resize(static_cast<std::size_t>(n_[0]) * n_[1] * n_[2]);
 
+    std::atomic<std::size_t> on_surface = 0;
+    tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](std::size_t i) {
+      on_surface += is_on_surface(tree_, mesh.triangles[i]);
+    });
+    if (on_surface == 0)
+      refuse(
+          "The mesh encloses nothing: seen from everywhere it covers less than half of all "
+          "directions. Give it thickness or close it.");
+    meets_itself_ = on_surface < mesh.triangles.size();
+  }
+
+  MeshBake report() const { return {n_, h_, origin_, mesh_.open_edges.size(), meets_itself_}; }
+  bool simple() const { return mesh_.open_edges.empty() && !meets_itself_; }
+
+  // |f| is the distance to the triangles. The neighbour's plus one voxel is a bound to start from.
+  bool measure() {
+    return rows(0, 0.5, [this](int i, int j) {
+      double bound = far_;
+      for (int k = 0; k < n_[2]; ++k) {
+        const double d = tree_.distance(point(i, j, k), bound);
+        f_[index(i, j, k)] = static_cast<float>(d);
+        bound = d + 1.001 * h_;
+      }
+    });
+  }
+
+  // f is negative inside. In a closed mesh a node is where its neighbour is, if no triangle is as
+  // near as that.
+  bool sign() {
+    std::atomic<bool> any_inside = false;
+    if (!simple()) winding_.resize(f_.size());
+    const bool done = rows(0.5, 0.9, [&](int i, int j) {
+      bool inside = false;
+      for (int k = 0; k < n_[2]; ++k) {
+        const std::size_t at = index(i, j, k);
+        if (!simple() || k == 0 || f_[at] <= 1.001 * h_) {
+          const double w = tree_.winding_number(point(i, j, k));
+          inside = w > 0.5;
+          if (!simple()) winding_[at] = static_cast<float>(w);
+        }
+        if (inside) {
+          f_[at] = -f_[at];
+          any_inside = true;
+        }
+      }
+    });
+    if (done && !any_inside)
+      refuse("No node of the grid lies inside the mesh: it is thinner than a voxel of ", h_,
+             " everywhere. Raise the resolution or give the mesh thickness.");
+    return done;
+  }
+
+  // |f| is the distance to the surface, where that is more or less than the triangles.
+  bool close() {
+    std::vector<char> fixed(f_.size());
+    const bool done =
+        rows(0.9, 0.95,
+             [&](int i, int j) {
+               for (int k = 0; k < n_[2]; ++k) {
+                 const std::size_t at = index(i, j, k);
+                 // Outside a mesh without holes the nearest triangle is on the surface: that
+                 // distance is exact.
+                 fixed[at] = beside_surface(i, j, k) || (mesh_.open_edges.empty() && f_[at] > 0);
+               }
+             }) &&
+        rows(0.95, 0.98, [&](int i, int j) {
+          for (int k = 0; k < n_[2]; ++k) {
+            const std::size_t at = index(i, j, k);
+            double d = std::abs(f_[at]);
+            if (fixed[at] && !mesh_.open_edges.empty()) {
+              const double slope = winding_slope(mesh_.open_edges, point(i, j, k));
+              if (slope > 0) d = std::min(d, std::abs(winding_[at] - 0.5) / slope);
+            } else if (!fixed[at] && meets_itself_) {
+              d = far_;  // parts of triangles that lie inside bound nothing
+            }
+            f_[at] = std::copysign(static_cast<float>(d), f_[at]);
+          }
+        });
+    if (done) solve_eikonal(f_, fixed, n_, h_);
+    return done;
+  }
+
+  std::vector<float> take() { return std::move(f_); }
+
+ private:
   std::size_t index(int i, int j, int k) const {
-    return (static_cast<std::size_t>(i) * n[1] + j) * n[2] + k;
+    return (static_cast<std::size_t>(i) * n_[1] + j) * n_[2] + k;
   }
   Vec3 point(int i, int j, int k) const {
-    return origin + Vec3{double(i), double(j), double(k)} * h;
+    return origin_ + Vec3{double(i), double(j), double(k)} * h_;
   }
-  // Rows (i, j, all k) in parallel, slice by slice; false if cancelled.
+  // Rows (i, j, all k) in parallel, slice by slice.
   template <class Row>
   bool rows(double from, double to, const Row& row) const {
-    for (int i = 0; i < n[0]; ++i) {
-      tbb::parallel_for(0, n[1], [&](int j) { row(i, j); });
-      if (!progress(from + (to - from) * (i + 1) / n[0])) return false;
+    for (int i = 0; i < n_[0]; ++i) {
+      tbb::parallel_for(0, n_[1], [&](int j) { row(i, j); });
+      if (!progress_(from + (to - from) * (i + 1) / n_[0])) return false;
     }
     return true;
   }
-  // Whether the grid edges at this node cross the surface.
-  bool beside_surface(const std::vector<float>& f, int i, int j, int k) const {
-    const bool inside = f[index(i, j, k)] < 0;
-    const int at[3] = {i, j, k};
+  // Whether a grid edge at this node crosses the surface.
+  bool beside_surface(int i, int j, int k) const {
+    const bool inside = f_[index(i, j, k)] < 0;
+    const Index3 at{i, j, k};
     for (int axis = 0; axis < 3; ++axis)
       for (const int step : {-1, 1}) {
-        int other[3] = {i, j, k};
-        other[axis] = at[axis] + step;
-        if (other[axis] < 0 || other[axis] >= n[axis]) continue;
-        if ((f[index(other[0], other[1], other[2])] < 0) != inside) return true;
+        Index3 other = at;
+        other[axis] += step;
+        if (other[axis] < 0 || other[axis] >= n_[axis]) continue;
+        if ((f_[index(other[0], other[1], other[2])] < 0) != inside) return true;
       }
     return false;
   }
+
+  const Mesh& mesh_;
+  TriangleTree tree_;
+  std::function<bool(double)> progress_;
+  Index3 n_;
+  double h_, far_;
+  Vec3 origin_;
+  bool meets_itself_;
+  std::vector<float> f_, winding_;
 };
 
 }  // namespace
@@ -141,93 +244,14 @@ std::optional<MeshBake> bake_mesh_distance(const std::vector<Vec3>& vertices,
   if (!(margin >= 0 && std::isfinite(margin)))
     refuse("margin is ", margin, "; it takes a length of 0 or more.");
   const Mesh mesh = make_mesh(vertices, triangles);
-
-  // Nodes: the longest side fits, the others overhang by the same on both ends.
-  const Vec3 size = mesh.bounds.max - mesh.bounds.min + Vec3{2, 2, 2} * margin;
-  Bake bake{{}, max_component(size) / (resolution - 1), {}, progress};
-  for (int axis = 0; axis < 3; ++axis) {
-    bake.n[axis] = std::max(2, static_cast<int>(std::ceil(size[axis] / bake.h - 1e-6)) + 1);
-    bake.origin[axis] =
-        (mesh.bounds.min[axis] + mesh.bounds.max[axis] - (bake.n[axis] - 1) * bake.h) / 2;
-  }
-  const auto& n = bake.n;
-  const TriangleTree tree(mesh.triangles);
-  std::atomic<std::size_t> on_surface = 0;
-  tbb::parallel_for(std::size_t{0}, mesh.triangles.size(),
-                    [&](std::size_t i) { on_surface += is_on_surface(tree, mesh.triangles[i]); });
-  if (on_surface == 0)
-    refuse(
-        "The mesh encloses nothing: seen from everywhere it covers less than half of all "
-        "directions. Give it thickness or close it.");
-  const MeshBake report{n, bake.h, bake.origin, mesh.open_edges.size(),
-                        on_surface < mesh.triangles.size()};
-  const bool simple = mesh.open_edges.empty() && !report.meets_itself;
-
-  // Distance to the triangles. The neighbour's plus one voxel is a bound to start from.
-  std::vector<float> f(static_cast<std::size_t>(n[0]) * n[1] * n[2]);
-  const double far = 2 * length(size);
-  if (!bake.rows(0, 0.5, [&](int i, int j) {
-        double bound = far;
-        for (int k = 0; k < n[2]; ++k) {
-          const double d = tree.distance(bake.point(i, j, k), bound);
-          f[bake.index(i, j, k)] = static_cast<float>(d);
-          bound = d + 1.001 * bake.h;
-        }
-      }))
-    return std::nullopt;
-
-  // Sign. In a closed mesh it is that of the neighbour where no triangle is as near as that.
-  std::atomic<bool> any_inside = false;
-  std::vector<float> winding(simple ? 0 : f.size());
-  if (!bake.rows(0.5, 0.9, [&](int i, int j) {
-        bool inside = false;
-        for (int k = 0; k < n[2]; ++k) {
-          float& value = f[bake.index(i, j, k)];
-          if (!simple || k == 0 || value <= 1.001 * bake.h) {
-            const double w = tree.winding_number(bake.point(i, j, k));
-            inside = w > 0.5;
-            if (!simple) winding[bake.index(i, j, k)] = static_cast<float>(w);
-          }
-          if (inside) {
-            value = -value;
-            any_inside = true;
-          }
-        }
-      }))
-    return std::nullopt;
-  if (!any_inside)
-    refuse("No node of the grid lies inside the mesh: it is thinner than a voxel of ", bake.h,
-           " everywhere. Raise the resolution (", resolution, ") or give the mesh thickness.");
-
-  if (!simple) {
-    std::vector<char> fixed(f.size());
-    if (!bake.rows(0.9, 0.95, [&](int i, int j) {
-          for (int k = 0; k < n[2]; ++k) {
-            const std::size_t at = bake.index(i, j, k);
-            // Outside a mesh without holes the nearest triangle is on the surface: that distance is
-            // exact.
-            fixed[at] = bake.beside_surface(f, i, j, k) || (mesh.open_edges.empty() && f[at] > 0);
-          }
-        }))
-      return std::nullopt;
-    if (!bake.rows(0.95, 0.98, [&](int i, int j) {
-          for (int k = 0; k < n[2]; ++k) {
-            const std::size_t at = bake.index(i, j, k);
-            double d = std::abs(f[at]);
-            if (fixed[at] && !mesh.open_edges.empty()) {
-              const double slope = winding_slope(mesh.open_edges, bake.point(i, j, k));
-              if (slope > 0) d = std::min(d, std::abs(winding[at] - 0.5) / slope);
-            } else if (!fixed[at] && report.meets_itself) {
-              d = far;  // parts of triangles that lie inside bound nothing
-            }
-            f[at] = std::copysign(static_cast<float>(d), f[at]);
-          }
-        }))
-      return std::nullopt;
-    solve_eikonal(f, fixed, n, bake.h);
-  }
-
-  write_vdb(path, {n, Vec3{1, 1, 1} * bake.h, bake.origin, {{"mean", 1, std::move(f)}}});
+  Bake bake(mesh, resolution, margin, progress);
+  if (!bake.measure() || !bake.sign()) return std::nullopt;
+  if (!bake.simple() && !bake.close()) return std::nullopt;
+  const MeshBake report = bake.report();
+  write_vdb(path, {report.resolution,
+                   Vec3{1, 1, 1} * report.voxel_size,
+                   report.origin,
+                   {{"mean", 1, bake.take()}}});
   progress(1);
   return report;
 }
