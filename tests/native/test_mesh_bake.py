@@ -104,6 +104,7 @@ def test_boxes_that_overlap_have_one_surface(tmp_path):
     # Deep inside no wall is left where the boxes meet: one box's own distance is a lower bound of the depth.
     deep = exact < -2 * h
     assert np.all(f[deep] < exact[deep] + h) and np.mean(f[deep] < exact[deep] + 0.5 * h) > 0.95
+    assert max(np.abs(np.diff(f, axis=axis)).max() for axis in range(3)) < 2 * h
 
 
 def test_progress_and_cancel(tmp_path):
