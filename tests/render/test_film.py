@@ -87,6 +87,14 @@ def test_estimated_error_is_relmse(seed):
     assert abs(film.estimated_error - true_errors.mean()) < 4 * standard_error + 0.01 * true_errors.mean()
 
 
+def test_estimated_error_is_its_formula():
+    """Grey samples, so that the luminance's variance is that of each channel; dark pixels, where the .01 counts."""
+    samples = np.random.default_rng(5).exponential(0.05, (3, 4, 64, 1)) * np.ones(3)
+    film = film_of(samples)
+    mean, variance = (film.passes[name][..., 0].astype(float) for name in ("combined", "variance"))
+    assert film.estimated_error == pytest.approx(np.mean(variance / (mean**2 + 0.01)), rel=1e-5)
+
+
 def test_sums_do_not_depend_on_order():
     """Values over 20 orders of magnitude, blocks added in three orders and through merges: identical bit by bit."""
     samples = 10.0 ** np.random.default_rng(3).uniform(-12, 8, (160, 3))
