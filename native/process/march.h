@@ -32,6 +32,8 @@ class March {
     mean_deviation_ = std::isinf(plan.smooth_scale)
                           ? 0
                           : 0.05 * std::pow(speed, 4) / std::pow(plan.smooth_scale, 3);
+    mean_slope_ = plan.mean_lipschitz * speed;
+    sigma_slope_ = plan.sigma_lipschitz * speed;
   }
 
   // Fills line.hit_* and returns the hit's t, or infinity.
@@ -55,18 +57,29 @@ class March {
     Point from = begin(a, start);
     line_.stretches.push_back({a, a, 0});
 
+    bool new_piece = false;
     for (int steps = 0; steps < kMaxSteps; ++steps) {
-      const bool aligned = b == cell_end();
-      const Point to = evaluate_end(b, aligned);
-      if (find_root(from, to)) return line_.hit_t;
+      b = step_end(a, t_end);
+      const double whole = std::min(cell_end(), t_end);
+      Point to;
+      if (kBreaks && piece_end_ < whole && tried_cell_ != cell_ &&
+          certainly_clear(from, whole, to)) {
+        b = whole;
+        new_piece = true;
+      } else {
+        enter(a, b);
+        if (new_piece) from = combine(a, from.g, from.dg);  // same path, fields of the new piece
+        to = evaluate_end(b);
+        if (find_root(from, to)) return line_.hit_t;
+        new_piece = kBreaks && b == piece_end_;
+      }
       line_.stretches.back().end = b;
       line_.stretches.back().last_cell = cell_;
       if (b >= t_end) return kInfinity;
 
-      const bool new_piece = kBreaks && b == piece_end_;
       from = to;
       a = b;
-      if (aligned) ++cell_;
+      if (b == cell_end()) ++cell_;
       if (to.mean > threshold_at(a)) {
         const double clear = mean_.above_until(a, t_end, threshold_at(a));
         if (clear >= t_end) return kInfinity;
@@ -74,18 +87,15 @@ class March {
           a = clear;
           cell_ = static_cast<long>(std::floor(line_.q_of(a) / Path::kStep));
           path_.prepare(cell_, rng_, counters_);
-          b = step_end(a, t_end);
-          enter(a, b);
+          enter(a, step_end(a, t_end));
           from = evaluate(a);
+          new_piece = false;
           if (!(from.f > 0)) ++counters_.line_entry_inside;
           line_.stretches.push_back({a, a, cell_});
           continue;
         }
       }
       path_.prepare(cell_, rng_, counters_);
-      b = step_end(a, t_end);
-      enter(a, b);
-      if (new_piece) from = combine(a, from.g, from.dg);  // same path, fields of the new piece
     }
     ++counters_.line_step_limit;
     return kInfinity;
@@ -93,6 +103,7 @@ class March {
 
  private:
   static constexpr int kMaxSteps = 1 << 20;
+  static constexpr double kDeviation = 0.16;  // of a path from its cubic, see classify
   static constexpr bool kBreaks = MeanLine::kBreaks || SigmaLine::kBreaks;
 
   struct Point {
@@ -149,12 +160,31 @@ class March {
     return combine(t, g, dg);
   }
 
-  Point evaluate_end(double b, bool aligned) {
-    if (!aligned) return evaluate(b);
+  Point evaluate_end(double b) {
+    if (b != cell_end()) return evaluate(b);
     double g, dg;
     path_.at_right(cell_, g, dg);
     line_.condition((cell_ + 1) * Path::kStep, g, dg);
     return combine(b, g, dg);
+  }
+
+  // A cell of the path that holds many pieces of the fields (voxels), crossed at once where bounds
+  // show that it holds no root: the mean and the deviation by their steepest slopes, g by its cubic
+  // (see classify). `to` is its far end.
+  bool certainly_clear(const Point& from, double whole, Point& to) {
+    tried_cell_ = cell_;
+    if (!(from.f > 0)) return false;
+    enter(whole, whole);
+    to = evaluate_end(whole);
+    const double h = whole - from.t, hq = h * line_.inverse_length;
+    const double mean = 0.5 * (from.mean + to.mean - mean_slope_ * h);
+    const double g = std::min({from.g, to.g, from.g + hq * from.dg / 3, to.g - hq * to.dg / 3}) -
+                     kDeviation * (hq * hq) * (hq * hq);
+    const double middle = 0.5 * (from.sigma + to.sigma), spread = 0.5 * sigma_slope_ * h;
+    const double sigma = g < 0 ? middle + spread : std::max(0.0, middle - spread);
+    if (!(mean + sigma * g > 0)) return false;
+    ++counters_.line_cells_clear;
+    return true;
   }
 
   // The state at the start (definitions B1-B4), as corrections of the path at q = 0.
@@ -222,7 +252,7 @@ class March {
     const double h = b.t - a.t, hq = h * line_.inverse_length;
     const double sigma = std::max(a.sigma, b.sigma) + std::abs(b.dsigma - a.dsigma) * h;
     const double margin =
-        0.16 * sigma * (hq * hq) * (hq * hq) + mean_deviation_ * (h * h) * (h * h);
+        kDeviation * sigma * (hq * hq) * (hq * hq) + mean_deviation_ * (h * h) * (h * h);
     const double c1 = a.f + h * a.df / 3, c2 = b.f - h * b.df / 3;
     if (b.f > 0) return c1 > margin && c2 > margin ? Verdict::none : Verdict::unclear;
     return c1 < margin && c2 > -margin ? Verdict::unclear
@@ -307,8 +337,9 @@ class March {
   const PlannedLine& plan_;
   Rng& rng_;
   Counters& counters_;
-  long cell_ = 0;
-  double piece_end_ = kInfinity;  // where the smooth piece of the fields ends
+  long cell_ = 0, tried_cell_ = -1;
+  double mean_slope_, sigma_slope_;  // upper bounds per t
+  double piece_end_ = kInfinity;     // where the smooth piece of the fields ends
   double smooth_step_, mean_deviation_, extra_threshold_ = 0;
 };
 

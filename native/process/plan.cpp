@@ -134,6 +134,8 @@ PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Sampler sa
   plan.skip_threshold =
       std::max(plan.skip_deviations * sigma.max, 1e-4 * process->kernel.min_length_scale());
   plan.smooth_scale = std::min(process->mean->smooth_scale(), process->sigma->smooth_scale());
+  plan.mean_lipschitz = process->mean->lipschitz();
+  plan.sigma_lipschitz = process->sigma->lipschitz();
   // B⁻ᵀ of a diagonal times a rotation.
   plan.unwhitening = transpose(inverse(process->kernel.whitening()));
 

@@ -16,6 +16,7 @@ struct PlannedLine {
       0;  // where the mean exceeds it, the surface is certainly absent (definitions B13)
   double skip_deviations = 0;  // the same in standard deviations
   double smooth_scale = kInfinity;
+  double mean_lipschitz = kInfinity, sigma_lipschitz = kInfinity;
   Box3 bounds;                             // object space; outside there is no surface
   Mat3 unwhitening;                        // B⁻ᵀ
   Sampler sampler = Sampler::convolution;  // resolved, never automatic
