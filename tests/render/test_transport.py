@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from statistics_checks import Z_LIMIT
+from statistics_checks import Z_LIMIT, check_z
 
 gn = pytest.importorskip("gpis_native")
 
@@ -74,7 +74,7 @@ def test_furnace_with_light_sampling(ratio, material, memory, seed, full_size):
 
 
 @pytest.mark.stats
-@pytest.mark.parametrize("material", ["lambert", "mirror"])
+@pytest.mark.parametrize("material", ["lambert", "mirror", "conductor"])
 def test_both_samplers_agree_under_a_gradient(material, seed, full_size):
     """Oracle 13's pair: albedo .5 under a world that is a linear gradient, pixel by pixel."""
     gradient = np.linspace(0, 1, 32)[:, None, None] * np.ones((32, 8, 3))
@@ -139,3 +139,38 @@ def test_renewal_loses_no_paths(seed):
     assert np.all(np.abs(renewal - REFERENCE) < 3 * np.hypot(error, REFERENCE_ERROR) + 0.002), (renewal, error)
     forgetful, _ = standard_sphere("none", 32, seed)
     assert np.all(forgetful[:3] < renewal[:3] - 0.005)
+
+
+@pytest.mark.stats
+@pytest.mark.parametrize("memory", MEMORIES)
+@pytest.mark.parametrize("material", ["lambert", "mirror"])
+def test_light_sampling_changes_no_expectation(material, memory, seed, full_size):
+    """Oracle 19, under a lamp of finite size that both strategies find."""
+    lamp = np.eye(4)
+    lamp[:3, 3] = [1.5, 2, 3]
+    light = {"name": "lamp", "type": "point", "matrix": lamp, "power": 300.0, "radius": 0.6}
+    size, samples = (16, 4096) if full_size else (12, 1024)
+    means = []
+    for light_sampling in (True, False):
+        result = gn.render(
+            gn.Scene(
+                sphere(
+                    LENGTH_SCALE,
+                    material,
+                    memory=memory,
+                    color=(0.7, 0.7, 0.7),
+                    world={"color": (0, 0, 0)},
+                    settings={"light_sampling": light_sampling},
+                )
+                | {"lights": [light]}
+            ),
+            size,
+            size,
+            samples=samples,
+            seed=seed + light_sampling,
+        )
+        image, variance = (result.passes[p][..., 0].astype(float) for p in ("combined", "variance"))
+        means.append((image.mean(), variance.sum() / image.size**2))
+    (on, var_on), (off, var_off) = means
+    assert var_on < var_off
+    check_z(on - off, 0, np.sqrt(var_on + var_off), f"{material}, {memory}")
