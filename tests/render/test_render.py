@@ -222,11 +222,16 @@ def test_ctrl_c_ends_the_render(noisy):
     import os
     import signal
 
-    timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
-    timer.start()
-    with pytest.raises(KeyboardInterrupt):
-        gn.render(noisy, 700, 700, samples=1000000)
-    timer.join()
+    # A shell's background jobs start with the signal ignored: say that Ctrl-C interrupts.
+    previous = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
+        timer.start()
+        with pytest.raises(KeyboardInterrupt):
+            gn.render(noisy, 700, 700, samples=1000000, time_limit=60)
+        timer.join()
+    finally:
+        signal.signal(signal.SIGINT, previous)
 
 
 def test_python_runs_while_rendering_and_renders_run_at_once(noisy):
