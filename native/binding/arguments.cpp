@@ -2,6 +2,8 @@
 
 #include <pybind11/numpy.h>
 
+#include <filesystem>
+
 #include "field/constant_field.h"
 
 namespace gpis {
@@ -23,6 +25,25 @@ Memory memory_argument(const std::string& value, const std::string& name) {
   if (value == "renewal+") return Memory::renewal_plus;
   throw std::invalid_argument(name + " is '" + value +
                               "', it takes 'none', 'renewal' or 'renewal+'.");
+}
+
+std::string path_argument(const py::handle& value, const std::string& name) {
+  PyObject* encoded = nullptr;
+  if (!PyUnicode_FSConverter(value.ptr(), &encoded)) {
+    PyErr_Clear();
+    throw std::invalid_argument(name + " must be the path of a file, it is " +
+                                py::repr(value).cast<std::string>() + ".");
+  }
+  return py::reinterpret_steal<py::bytes>(encoded);
+}
+
+void check_replaceable(const std::string& path, const std::string& name) {
+  std::error_code error;
+  if (path.empty()) throw std::invalid_argument(name + " is empty; it takes the path of a file.");
+  if (std::filesystem::exists(path, error) && !std::filesystem::is_regular_file(path, error))
+    throw std::invalid_argument(
+        name + " is \"" + path +
+        "\", which is there and is not a file; it takes the path of a file.");
 }
 
 Vec3 vec_or_number(const py::handle& value, const std::string& name) {

@@ -3,6 +3,8 @@
 
 #include <pybind11/pybind11.h>
 
+#include <string>
+
 #include "core/counters.h"
 #include "field/field.h"
 #include "process/gaussian_process.h"
@@ -14,6 +16,24 @@ FieldPtr field_argument(const pybind11::handle& value, const std::string& name);
 
 // 'none', 'renewal' or 'renewal+'.
 Memory memory_argument(const std::string& value, const std::string& name);
+
+// An instance of a class of this module, never None: a null pointer in C++. `takes` is its name
+// with an article.
+template <class T>
+std::shared_ptr<T> instance_argument(const pybind11::handle& value, const std::string& name,
+                                     const std::string& takes) {
+  if (pybind11::isinstance<T>(value)) return value.cast<std::shared_ptr<T>>();
+  throw std::invalid_argument(
+      name + " must be " + takes + ", it is a " +
+      pybind11::str(pybind11::type::handle_of(value).attr("__name__")).cast<std::string>() + ".");
+}
+
+// A path as Python's open takes it (str, bytes, os.PathLike).
+std::string path_argument(const pybind11::handle& value, const std::string& name);
+
+// Refuses a path to write to that holds something else than a file: renaming the new file onto it
+// would remove it.
+void check_replaceable(const std::string& path, const std::string& name);
 
 // Three numbers, or one that stands for all three.
 Vec3 vec_or_number(const pybind11::handle& value, const std::string& name);

@@ -148,11 +148,11 @@ field(points (N, 3)) -> (N,); field.gradient(points) -> (N, 3). Fields add to fi
       .def("__call__", &values_at, "points"_a, "Values (N,) at points (N, 3).")
       .def("gradient", &gradients_at, "points"_a,
            "Exact gradients (N, 3) of the field, as it is interpolated, at points (N, 3).")
-      .def("__add__", add)
-      .def("__add__", add_number)
-      .def("__radd__", add_number)
-      .def("__mul__", scale)
-      .def("__rmul__", scale)
+      .def("__add__", add, py::arg("other").none(false), py::is_operator())
+      .def("__add__", add_number, py::is_operator())
+      .def("__radd__", add_number, py::is_operator())
+      .def("__mul__", scale, py::is_operator())
+      .def("__rmul__", scale, py::is_operator())
       .def(
           "clamped",
           [](const SharedField& f, double low, double high) -> SharedField {

@@ -19,6 +19,9 @@ namespace {
 
 using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
+// As render takes; TBB overflows its stack at a million.
+constexpr int kMostThreads = 1024;
+
 std::vector<Vec3> points_argument(const py::handle& value, const char* name) {
   const Array a = Array::ensure(value);
   if (!a || a.ndim() != 2 || a.shape(1) != 3) {
@@ -35,26 +38,25 @@ std::vector<Vec3> points_argument(const py::handle& value, const char* name) {
   return points;
 }
 
-SquaredExponential make_kernel(const py::object& length_scale, const py::object& rotation) {
-  Vec3 l;
-  if (py::isinstance<py::sequence>(length_scale) || py::isinstance<py::array>(length_scale)) {
-    const auto v = length_scale.cast<std::vector<double>>();
-    if (v.size() != 3)
-      throw std::invalid_argument("length_scale must be a number or three numbers, it has " +
-                                  std::to_string(v.size()) + ".");
-    l = {v[0], v[1], v[2]};
-  } else {
-    const double v = length_scale.cast<double>();
-    l = {v, v, v};
+Array numbers_argument(const py::handle& value, py::ssize_t count, const char* sentence) {
+  const Array a = Array::ensure(value);
+  if (!a || a.ndim() != 1 || a.shape(0) != count) {
+    PyErr_Clear();
+    throw std::invalid_argument(sentence);
   }
+  return a;
+}
+
+SquaredExponential make_kernel(const py::object& length_scale, const py::object& rotation) {
+  const Vec3 l = vec_or_number(length_scale, "length_scale");
   Mat3 axes;
   if (!rotation.is_none()) {
-    const auto q = rotation.cast<std::vector<double>>();
-    if (q.size() != 4) throw std::invalid_argument("rotation must be a quaternion (w, x, y, z).");
-    const double n = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    const Array q = numbers_argument(rotation, 4, "rotation must be a quaternion (w, x, y, z).");
+    const double n =
+        std::sqrt(q.at(0) * q.at(0) + q.at(1) * q.at(1) + q.at(2) * q.at(2) + q.at(3) * q.at(3));
     if (!(n > 0) || !std::isfinite(n))
       throw std::invalid_argument("rotation must be a quaternion that is not zero.");
-    const double w = q[0] / n, x = q[1] / n, y = q[2] / n, z = q[3] / n;
+    const double w = q.at(0) / n, x = q.at(1) / n, y = q.at(2) / n, z = q.at(3) / n;
     axes = {{Vec3{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
              Vec3{2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
              Vec3{2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}}};
@@ -84,6 +86,7 @@ Array sample(const GaussianProcess& gp, const py::object& at, py::ssize_t n, std
     throw std::invalid_argument("sample draws at up to 4096 points jointly, these are " +
                                 std::to_string(x.size()) + ".");
   if (n < 0) throw std::invalid_argument("n must not be negative.");
+  if (x.empty()) return to_array(Eigen::MatrixXd(n, 0));  // Eigen's solver takes no empty matrix
   // Eigenvectors, not Cholesky: the matrix is singular to rounding wherever points are near
   // (math.md §5, traps).
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance_matrix(gp, x, x));
@@ -126,11 +129,15 @@ FirstHitsQuery query_argument(const py::object& origins, const py::object& direc
   }
   if (!(t_max > 0))
     throw std::invalid_argument("t_max must be positive, it is " + std::to_string(t_max) + ".");
-  if (threads < 0) throw std::invalid_argument("threads must not be negative (0 = all cores).");
+  if (threads < 0 || threads > kMostThreads)
+    throw std::invalid_argument("threads must be 0 (all cores) to " + std::to_string(kMostThreads) +
+                                ", it is " + std::to_string(threads) + ".");
   if (!start.is_none()) {
-    const py::dict s = start.cast<py::dict>();
+    if (!py::isinstance<py::dict>(start))
+      throw std::invalid_argument("start must be None or a dict of value and gradient.");
+    const auto s = py::reinterpret_borrow<py::dict>(start);
     for (const auto& item : s) {
-      const auto key = item.first.cast<std::string>();
+      const auto key = py::str(item.first).cast<std::string>();
       if (key != "value" && key != "gradient")
         throw std::invalid_argument("start: unknown key '" + key + "' (takes value, gradient).");
     }
@@ -142,9 +149,10 @@ FirstHitsQuery query_argument(const py::object& origins, const py::object& direc
         gradient.size() != o.size())
       throw std::invalid_argument("start must hold value (N,) and gradient (N, 3), one row a ray.");
     for (std::size_t i = 0; i < o.size(); ++i) {
-      if (!(value.at(i) >= 0))
-        throw std::invalid_argument("start['value'][" + std::to_string(i) +
-                                    "] must be 0 (on the surface) or positive (outside).");
+      if (!(value.at(i) >= 0) || std::isinf(value.at(i)))
+        throw std::invalid_argument(
+            "start['value'][" + std::to_string(i) +
+            "] must be 0 (on the surface) or positive (outside), and finite.");
       query.start.push_back({value.at(i), gradient[i]});
     }
   }
@@ -155,15 +163,16 @@ FirstHitsQuery query_argument(const py::object& origins, const py::object& direc
   return query;
 }
 
-py::dict first_hits_dict(const std::shared_ptr<GaussianProcess>& gp, const py::object& origins,
+py::dict first_hits_dict(const py::object& gp, const py::object& origins,
                          const py::object& directions, double t_max, const std::string& memory,
                          const py::object& start, std::uint64_t first_index,
                          const std::string& sampler, double tolerance, std::uint64_t seed,
                          int threads) {
+  const auto process = instance_argument<GaussianProcess>(gp, "gp", "a GaussianProcess");
   const FirstHitsQuery query =
       query_argument(origins, directions, t_max, start, first_index, seed, threads);
-  const ProcessSurface surface(gp, {}, memory_argument(memory, "memory"), sampler_argument(sampler),
-                               tolerance);
+  const ProcessSurface surface(process, {}, memory_argument(memory, "memory"),
+                               sampler_argument(sampler), tolerance);
   FirstHits hits;
   {
     py::gil_scoped_release release;
@@ -187,17 +196,18 @@ py::dict first_hits_dict(const std::shared_ptr<GaussianProcess>& gp, const py::o
                   "counters"_a = counters_dict(hits.counters));
 }
 
-Array line_values_array(const std::shared_ptr<GaussianProcess>& gp, const py::object& origins,
+Array line_values_array(const py::object& gp, const py::object& origins,
                         const py::object& directions, const std::vector<double>& t,
                         const std::string& memory, const py::object& start,
                         std::uint64_t first_index, const std::string& sampler, double tolerance,
                         std::uint64_t seed, int threads) {
   if (t.empty()) throw std::invalid_argument("t must hold at least one distance.");
   const double t_max = *std::max_element(t.begin(), t.end());
+  const auto process = instance_argument<GaussianProcess>(gp, "gp", "a GaussianProcess");
   const FirstHitsQuery query =
       query_argument(origins, directions, t_max, start, first_index, seed, threads);
-  const ProcessSurface surface(gp, {}, memory_argument(memory, "memory"), sampler_argument(sampler),
-                               tolerance);
+  const ProcessSurface surface(process, {}, memory_argument(memory, "memory"),
+                               sampler_argument(sampler), tolerance);
   std::vector<double> values;
   {
     py::gil_scoped_release release;
@@ -232,9 +242,10 @@ void bind_process(py::module_& m) {
       .def(
           "derivative_variance",
           [](const SquaredExponential& k, const py::object& direction) {
-            const auto d = direction.cast<std::vector<double>>();
-            if (d.size() != 3) throw std::invalid_argument("direction must hold three numbers.");
-            const Vec3 w = k.whitening() * Vec3{d[0], d[1], d[2]};
+            const Array d = numbers_argument(direction, 3, "direction must hold three numbers.");
+            const Vec3 v{d.at(0), d.at(1), d.at(2)};
+            if (!is_finite(v)) throw std::invalid_argument("direction must hold finite numbers.");
+            const Vec3 w = k.whitening() * v;
             return dot(w, w);
           },
           "direction"_a, "Variance of the derivative of g along `direction` (3,): dᵀA⁻¹d.");

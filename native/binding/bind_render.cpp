@@ -102,9 +102,9 @@ progress: called as progress(fraction, stats) from the calling thread at most ab
 The Python lock is released while rendering; any number of renders may run at once from several threads.
 Raises ValueError, with the name of the argument or the path in the description.)";
 
-std::shared_ptr<RenderResult> render_scene(const std::shared_ptr<const Scene>& scene,
-                                           const py::object& width, const py::object& height,
-                                           const py::object& samples, const py::object& time_limit,
+std::shared_ptr<RenderResult> render_scene(const py::object& scene, const py::object& width,
+                                           const py::object& height, const py::object& samples,
+                                           const py::object& time_limit,
                                            const py::object& noise_threshold,
                                            const py::object& first_sample, const py::object& seed,
                                            const py::object& threads, const py::object& memory,
@@ -135,7 +135,8 @@ std::shared_ptr<RenderResult> render_scene(const std::shared_ptr<const Scene>& s
       integer(threads, "threads", 0, 1024, "a number of threads up to 1024, 0 for all cores"));
   if (!progress.is_none() && !PyCallable_Check(progress.ptr()))
     refuse("progress", "takes a function of (fraction, stats), got " + shown(progress));
-  const std::shared_ptr<const Scene> rendered = with_memory(scene, memory);
+  const std::shared_ptr<const Scene> rendered =
+      with_memory(instance_argument<Scene>(scene, "scene", "a Scene (of a description)"), memory);
 
   const ProgressCallback callback = progress_callback(progress, options.stop);
   auto result = std::make_shared<RenderResult>();

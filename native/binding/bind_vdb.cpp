@@ -34,14 +34,14 @@ std::shared_ptr<Field> vdb_field(const py::object& path, const std::string& grid
   if (meaning != "value" && meaning != "variance")
     refuse("VdbField: meaning is '", meaning,
            "'; it takes 'value' or 'variance' (then the square root is taken).");
-  const auto file = py::str(path).cast<std::string>();
+  const std::string file = path_argument(path, "path");
   py::gil_scoped_release release;
   return std::const_pointer_cast<Field>(load_vdb_field(
       file, grid, meaning == "variance" ? GridMeaning::variance : GridMeaning::value));
 }
 
 py::list grids(const py::object& path) {
-  const auto file = py::str(path).cast<std::string>();
+  const std::string file = path_argument(path, "path");
   std::vector<VdbGridInfo> all;
   {
     py::gil_scoped_release release;
@@ -80,10 +80,16 @@ void write(const py::object& path, const py::dict& grids) {
     arrays.grids.push_back(std::move(grid));
   };
   for (const auto& [key, value] : grids) {
+    if (!py::isinstance<py::str>(key))
+      refuse("write_vdb: the dict has the key ", py::repr(key).cast<std::string>(),
+             "; the name of a grid is a text.");
     const auto name = key.cast<std::string>();
     if (name == "origin" || name == "voxel_size") continue;
     const auto a = FloatArray::ensure(value);
-    if (!a) throw py::error_already_set();
+    if (!a) {
+      PyErr_Clear();
+      refuse("write_vdb: '", name, "' is not an array of numbers.");
+    }
     const bool tensor = name == "anisotropy";
     if (!(tensor ? a.ndim() == 4 && a.shape(3) == 6
                  : a.ndim() == 3 || (a.ndim() == 4 && a.shape(3) == 3)) ||
@@ -113,7 +119,8 @@ void write(const py::object& path, const py::dict& grids) {
   check_positive("write_vdb: voxel_size", arrays.voxel_size);
   arrays.origin = vec_or_number(grids["origin"], "write_vdb: origin");
   check_finite("write_vdb: origin", arrays.origin);
-  const auto file = py::str(path).cast<std::string>();
+  const std::string file = path_argument(path, "write_vdb: path");
+  check_replaceable(file, "write_vdb: path");
   py::gil_scoped_release release;
   write_vdb(file, arrays);
 }
@@ -125,7 +132,7 @@ py::array_t<float> array_of(const VdbArray& grid, const Index3& n) {
 }
 
 py::dict read(const py::object& path, const std::vector<std::string>& names) {
-  const auto file = py::str(path).cast<std::string>();
+  const std::string file = path_argument(path, "path");
   VdbArrays arrays;
   {
     py::gil_scoped_release release;
@@ -164,7 +171,8 @@ py::object bake(
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
     return progress.is_none() || !progress(fraction).is(py::bool_(false));
   };
-  const auto file = py::str(path).cast<std::string>();
+  const std::string file = path_argument(path, "bake_mesh_distance: path");
+  check_replaceable(file, "bake_mesh_distance: path");
   const auto start = std::chrono::steady_clock::now();
   std::optional<MeshBake> report;
   {

@@ -109,8 +109,9 @@ void save_result(const RenderResult& result, const py::object& path) {
   arrays["format"] = kFormat;
   arrays["facts"] = py::module_::import("json").attr("dumps")(facts);
 
+  check_replaceable(path_argument(path, "save: path"), "save: path");
   const py::module_ os = py::module_::import("os");
-  const py::object name = os.attr("fspath")(path);
+  const py::object name = os.attr("fsdecode")(path);
   const py::object unfinished = name + py::str(".unfinished");
   const py::object file = py::module_::import("builtins").attr("open")(unfinished, "wb");
   try {
@@ -125,7 +126,7 @@ void save_result(const RenderResult& result, const py::object& path) {
 }
 
 std::shared_ptr<RenderResult> load_result(const py::object& path) {
-  const std::string name = py::str(path);
+  const std::string name = path_argument(path, "load_result: path");
   if (!py::cast<bool>(py::module_::import("os").attr("path").attr("isfile")(path)))
     throw FileNotFound("load_result: there is no file '" + name + "'");
   auto result = std::make_shared<RenderResult>();

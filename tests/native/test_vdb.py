@@ -1,5 +1,6 @@
 """Grids of .vdb files: our own, Blender's OpenVDB's, and published ones."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -188,3 +189,25 @@ def test_the_published_spheres_hold_a_variance(n):
     sigma = gn.VdbField(path, "variance", meaning="variance")
     # Left of the first sphere only σ = .1 counts, and the jitter within a voxel.
     assert sigma([[-1.2, 0.8, 0]])[0] ** 2 == pytest.approx(0.1**2 + (3 / n) ** 2 / 12, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("path", "words"), [(None, "it is None"), ("", "is empty"), ("folder", "is not a file"), ("pipe", "is not a file")]
+)
+def test_only_files_are_replaced(tmp_path, path, words):
+    """A file is renamed to its place when it is complete: a folder or device there must not be lost."""
+    (tmp_path / "folder").mkdir()
+    os.mkfifo(tmp_path / "pipe")
+    before = sorted(tmp_path.iterdir())
+    with pytest.raises(ValueError, match=words):
+        gn.write_vdb(
+            str(tmp_path / path) if path else path,
+            {"mean": np.zeros((3, 3, 3)), "origin": (0, 0, 0), "voxel_size": 1.0},
+        )
+    assert sorted(tmp_path.iterdir()) == before and (tmp_path / "pipe").is_fifo()
+
+
+@pytest.mark.parametrize("grids", [{1: np.zeros((3, 3, 3))}, {"mean": "x"}])
+def test_a_grid_is_a_named_array(tmp_path, grids):
+    with pytest.raises(ValueError, match="write_vdb: "):
+        gn.write_vdb(tmp_path / "x.vdb", {**grids, "origin": (0, 0, 0), "voxel_size": 1.0})

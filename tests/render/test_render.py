@@ -351,3 +351,18 @@ def test_unknown_keywords_are_refused(noisy):
 def test_numpy_numbers_are_numbers(noisy):
     result = gn.render(noisy, np.int64(8), np.int32(8), samples=np.uint16(16), noise_threshold=np.float32(0.1), seed=np.int64(2))
     assert result.stats["stopped_by"] == "samples"
+
+
+def test_a_scene_is_asked_for():
+    with pytest.raises(ValueError, match="scene must be a Scene"):
+        gn.render(None, 4, 4, samples=1)
+
+
+def test_save_replaces_only_files(tmp_path):
+    description = {"version": 1, "camera": {"type": "perspective", "matrix": np.eye(4), "fov_x": 0.8}}
+    result = gn.render(gn.Scene(description), 4, 4, samples=1)
+    (tmp_path / "folder").mkdir()
+    for path in (tmp_path / "folder", "", None):
+        with pytest.raises(ValueError, match="save: path"):
+            result.save(path)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["folder"]
