@@ -16,6 +16,11 @@ def describe(sync, width, height):
     camera = sync.scene.camera
     if camera is None:
         raise SyncError(f'Scene "{sync.scene.name}" has no camera: add one, or choose it in the Scene properties.')
+    if camera.type != "CAMERA":
+        raise SyncError(
+            f'Scene "{sync.scene.name}" looks through "{camera.name}", an object of type {camera.type}: choose a '
+            "camera in the Scene properties."
+        )
     camera = camera.evaluated_get(sync.depsgraph)
     data = camera.data
     if data.type not in {"PERSP", "ORTHO"}:

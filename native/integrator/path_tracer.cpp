@@ -107,6 +107,12 @@ PathSample PathTracer::Impl::trace(const Ray& camera_ray, double t_max) {
       result.albedo = v.material->albedo();
     }
     if (!next) break;
+    if (!is_finite(next->direction)) {
+      // A gradient without direction. The film leaves the sample out and says so; the path would go
+      // on for ever.
+      result.radiance = {std::nan(""), std::nan(""), std::nan("")};
+      break;
+    }
     throughput = throughput * next->weight;
 
     // Russian roulette, only on what has been lost: a lossless path is never ended.

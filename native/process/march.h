@@ -246,9 +246,9 @@ class March {
   // it: u²(h-u)² |g''''| / 24 <= (4/3)(B₁+B₂) · 4.5 √105 (h/2)⁴/24, 4.5 standard deviations of
   // g'''' (√105 per length scale⁴).
   Verdict classify(const Point& a, const Point& b) const {
-    if (a.f < 0)
-      return Verdict::none;  // inside (after a skip, or a certain start): wait until the path is
-                             // out
+    // Inside (after a skip, or a certain start), or where mean and σ are both 0: wait until the
+    // path is out.
+    if (a.f < 0 || (a.f == 0 && !(a.df > 0))) return Verdict::none;
     const double h = b.t - a.t, hq = h * line_.inverse_length;
     const double sigma = std::max(a.sigma, b.sigma) + std::abs(b.dsigma - a.dsigma) * h;
     const double margin =

@@ -114,6 +114,10 @@ PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Sampler sa
   if (!(missed_root > 0 && missed_root < 1))
     refuse("missed_root must lie between 0 and 1, it is ", missed_root, ".");
 
+  const Range mean = process->mean->range();
+  if (sigma.max == 0 && mean.min == 0 && mean.max == 0)
+    refuse("mean and sigma are both 0 everywhere: there is no surface.");
+
   // Where a grid ends its field is a constant, and a jump there would be a surface of its own: no
   // surface outside.
   plan.bounds = process->bounds.value_or(everywhere());

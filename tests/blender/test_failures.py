@@ -136,3 +136,9 @@ def test_unexpected_failure_is_an_error_too(stage, tmp_path, extension, monkeypa
     engine = importlib.import_module(extension + ".engine")
     monkeypatch.setattr(engine.sync, "describe", lambda *_: 1 / 0)
     assert "ZeroDivisionError" in support.failure(stage, tmp_path)
+
+
+def test_something_else_than_a_camera(stage, ball, tmp_path):
+    stage.camera = ball
+    sentence = support.failure(stage, tmp_path)
+    assert '"Sphere GPIS", an object of type VOLUME' in sentence

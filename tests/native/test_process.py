@@ -181,9 +181,7 @@ def test_infinite_length_scale_is_one_normal(sampler, n, seed):
     """Oracle 14: f = μ + σξ with one ξ; a sphere is missed with probability Φ((b - R)/σ)."""
     from math import erf, sqrt
 
-    gp = gn.GaussianProcess(
-        gn.SphereField([0, 0, 0], 1), 0.2, gn.SquaredExponential(1e4), bounds=((-3, -3, -3), (3, 3, 3))
-    )
+    gp = gn.GaussianProcess(gn.SphereField([0, 0, 0], 1), 0.2, gn.SquaredExponential(1e4), bounds=((-3, -3, -3), (3, 3, 3)))
     for b in (0.7, 1.0, 1.2):
         origins = np.tile([b, 0.0, 2.9], (n // 4, 1))
         hits = gn.first_hits(gp, origins, np.tile([0.0, 0, -1], (n // 4, 1)), 6, sampler=sampler, seed=seed)
@@ -331,8 +329,36 @@ def test_streams_depend_on_the_row_alone(seed):
         (lambda: gn.first_hits(standard(), [[0, 0, 0]], [[1, 0, 0]], 1, memory="all"), "'renewal+'"),
         (lambda: gn.first_hits(standard(), [[0, 0, 0]], [[1, 0, 0]], 1, start={"valeu": [0]}), "unknown key 'valeu'"),
         (lambda: gn.first_hits(standard(bounds=None), [[0, 0, 0]], [[1, 0, 0]], 1, sampler="dense"), "smaller bounds"),
+        (lambda: gn.SquaredExponential("x"), "length_scale must be a number or three numbers, it is 'x'"),
+        (lambda: gn.SquaredExponential(1, rotation="x"), "rotation must be a quaternion"),
+        (lambda: gn.SquaredExponential(1).derivative_variance([1, np.nan, 0]), "direction must hold finite numbers"),
+        (lambda: gn.first_hits(None, [[0, 0, 0]], [[1, 0, 0]], 1), "gp must be a GaussianProcess, it is a NoneType"),
+        (lambda: gn.line_values(None, [[0, 0, 0]], [[1, 0, 0]], [1]), "gp must be a GaussianProcess"),
+        (lambda: gn.first_hits(standard(), [[0, 0, 0]], [[1, 0, 0]], 1, threads=10**6), "it is 1000000"),
+        (lambda: gn.first_hits(standard(), [[0, 0, 0]], [[1, 0, 0]], 1, start={1: 2}), "unknown key '1'"),
+        (lambda: gn.GaussianProcess(0, 0, gn.SquaredExponential(1)).plan(), "mean and sigma are both 0 everywhere"),
     ],
 )
 def test_bad_input_gets_a_sentence(make, sentence):
     with pytest.raises(ValueError, match=sentence):
         make()
+
+
+def test_none_is_no_field():
+    with pytest.raises(TypeError):
+        gn.SphereField([0, 0, 0], 1) + None
+
+
+def test_no_points_have_empty_samples():
+    assert standard().sample(np.zeros((0, 3)), 3).shape == (3, 0)
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_where_mean_and_sigma_are_zero_there_is_no_surface(direction):
+    """Only the faces at which the mean falls to 0 are met, with the gradient of the side the ray comes from."""
+    z = np.linspace(-2, 2, 9)
+    slab = np.where(np.abs(z) < 1, 0, np.abs(z) - 1) * np.ones((9, 9, 1))
+    gp = gn.GaussianProcess(gn.GridField(slab, 0.5, [-2, -2, -2]), 0, gn.SquaredExponential(1))
+    hits = gn.first_hits(gp, [[0.1, 0.2, 0.0], [0.1, 0.2, -1.9 * direction]], [[0, 0, direction]] * 2, 10)
+    np.testing.assert_allclose(hits["t"], [np.inf, 0.9], atol=1e-9)
+    np.testing.assert_allclose(hits["gradient"][1], [0, 0, -direction], atol=1e-6)
