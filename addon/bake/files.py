@@ -15,7 +15,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 _VERSIONED = re.compile(r"^(?P<name>.+)\.v(?P<version>\d{4,})\.vdb$")
-# Versions of a name that stay although nothing uses them: Blender's backup (.blend1) still points at the second.
+# Versions of a name that stay although nothing uses them, beside those of the backups.
 _KEPT = 2
 # Files made or used since the last load: undo may bring any of them back.
 _session = set()
@@ -83,15 +83,27 @@ def adopt(blend_path):
 
 
 def collect():
-    """Delete versions that nothing can point at any more."""
-    if not bpy.data.filepath:
+    """Delete versions that nothing can point at any more. A backup that was opened collects nothing."""
+    if not bpy.data.filepath.endswith(".blend"):
         return
+    backups = _times_of_backups()
     used = {path for _, path in _baked()} | _session
-    newest = {}
+    versions = {}
     for name, _version, path in sorted(_versions(folder(bpy.data.filepath)), key=lambda row: -row[1]):
-        newest.setdefault(name, []).append(path)
-        if path not in used and path not in newest[name][:_KEPT]:
-            path.unlink()
+        versions.setdefault(name, []).append(path)
+    for newest_first in versions.values():
+        kept = used.union(newest_first[:_KEPT])
+        # What a backup points at was the newest when it was saved.
+        kept.update(next((path for path in newest_first if path.stat().st_mtime <= time), None) for time in backups)
+        for path in newest_first:
+            if path not in kept:
+                path.unlink()
+
+
+def _times_of_backups():
+    """When the .blend1, .blend2 … beside this .blend were saved."""
+    backups = (Path(f"{bpy.data.filepath}{number}") for number in range(1, 33))  # 32: Blender's most
+    return [path.stat().st_mtime for path in backups if path.is_file()]
 
 
 @persistent

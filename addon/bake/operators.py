@@ -37,7 +37,9 @@ def bake(context, volume_object, *, resolution, margin):
     relative = volume_object.matrix_world.inverted_safe() @ source.matrix_world
     vertices, triangles = mesh_arrays(depsgraph, source, np.array(relative))
     size = float(max(vertices.max(axis=0) - vertices.min(axis=0)))
-    if not size > 0 or not np.isfinite(size):
+    if not np.isfinite(size):
+        raise ValueError(f'Object "{source.name}" has vertices whose coordinates are not numbers.')
+    if not size > 0:
         raise ValueError(f'Object "{source.name}" has no size: all its vertices are in one place.')
     if not settings.is_property_set("sigma"):
         settings.sigma = DEFAULT_SIGMA * size

@@ -212,7 +212,7 @@ def test_old_versions_are_collected_and_backups_stay_whole(stage, ball, tmp_path
     assert len(list(folder.iterdir())) == 4
     bpy.ops.wm.open_mainfile(filepath=str(blend))
     kept = sorted(folder.iterdir())
-    assert len(kept) == 2 and kept[-1] == used
+    assert len(kept) == 3 and kept[-1] == used, "the newest two and the backup's"
 
 
 def test_save_as_gives_the_copy_files_of_its_own(stage, ball, tmp_path):
@@ -222,3 +222,19 @@ def test_save_as_gives_the_copy_files_of_its_own(stage, ball, tmp_path):
     second = Path(bpy.path.abspath(ball.data.filepath))
     assert first.parent.name == "a_gpis" and second.parent.name == "b_gpis"
     assert first.read_bytes() == second.read_bytes()
+
+
+def test_the_bake_of_a_backup_stays(stage, ball, tmp_path):
+    """Several bakes between two saves: the .blend1 still opens with its own."""
+    blend = tmp_path / "scene.blend"
+    bpy.context.preferences.filepaths.save_version = 1
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    first = Path(bpy.path.abspath(ball.data.filepath))
+    for resolution in (12, 13, 14, 15):
+        bpy.ops.gpis.rebake(resolution=resolution)
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    assert first.is_file() and len(list(first.parent.iterdir())) == 3  # the backup's, and the two newest
+    bpy.ops.wm.open_mainfile(filepath=f"{blend}1")
+    assert Path(bpy.path.abspath(bpy.data.volumes[0].filepath)) == first
+    assert len(list(first.parent.iterdir())) == 3
