@@ -144,7 +144,10 @@ GradientLaw ProcessSurface::gradient_law(const Line& line, double t) const {
   const double spread = sigma.value * std::sqrt(one_minus_c2);
   law.b1 = to_world * (bt * (l.e1 * spread));
   law.b2 = to_world * (bt * (l.e2 * spread));
-  law.degenerate = sigma.value == 0 || one_minus_c2 < 1e-6;
+  // A spread below a millionth of the gradient (σ falling to 0, a short flight) has no density
+  // worth the name.
+  const double smaller = std::min(dot(law.b1, law.b1), dot(law.b2, law.b2));
+  law.degenerate = one_minus_c2 < 1e-6 || !(smaller > 1e-12 * dot(law.mean, law.mean));
   return law;
 }
 
