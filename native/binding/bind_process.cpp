@@ -5,6 +5,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <cstdint>
 #include <set>
 
 #include "binding/arguments.h"

@@ -1,6 +1,8 @@
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
+#include <cstdint>
+
 #include "binding/arguments.h"
 #include "binding/bind_film.h"
 #include "binding/bindings.h"

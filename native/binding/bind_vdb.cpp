@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <climits>
+#include <cstdint>
 
 #include "binding/arguments.h"
 #include "binding/bindings.h"

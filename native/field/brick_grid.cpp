@@ -1,6 +1,7 @@
 #include "field/brick_grid.h"
 
 #include <algorithm>
+#include <cstdint>
 
 #include "field/check.h"
 

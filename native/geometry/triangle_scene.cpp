@@ -1,5 +1,6 @@
 #include "geometry/triangle_scene.h"
 
+#include <cstdint>
 #include <stdexcept>
 #include <string>
 #include <vector>

@@ -2,6 +2,7 @@
 // benchmarks).
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "core/counters.h"

@@ -3,6 +3,7 @@
 // RGB, matrices map to world.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <boost/math/distributions/chi_squared.hpp>
+#include <cstdint>
 #include <functional>
 #include <optional>
 
