@@ -277,6 +277,8 @@ def test_grid_mean_equals_the_field_it_holds(n, seed):
         )
         for i, mean in enumerate([grid, gn.PlaneField([0, 0, 0], [0, 0.6, 0.8], 1)])
     ]
+    # Clear stretches of voxels are crossed in one step on the grid, and only there.
+    assert hits[0]["counters"]["line_cells_clear"] > 0 == hits[1]["counters"]["line_cells_clear"]
     check_same_distribution(hits[0]["t"], hits[1]["t"])
     for axis in range(3):
         check_same_distribution(*(h["gradient"][np.isfinite(h["t"]), axis] for h in hits))
