@@ -14,8 +14,10 @@
 #include "field/scaled_field.h"
 #include "field/sphere_field.h"
 #include "field/sum_field.h"
+#include "field/tensor_grid_field.h"
 #include "field/torus_field.h"
 #include "field/transformed_field.h"
+#include "field/transformed_tensor_field.h"
 
 namespace gpis {
 namespace py = pybind11;
@@ -95,6 +97,52 @@ std::shared_ptr<GridField> make_grid(const Array& values, const py::object& voxe
   return std::make_shared<GridField>(std::move(grid),
                                      vec_or_number(voxel_size, "GridField: voxel_size"),
                                      to_vec(origin), background);
+}
+
+using SharedTensorField = std::shared_ptr<TensorField>;
+
+std::shared_ptr<TensorGridField> make_tensor_grid(const Array& values, const py::object& voxel_size,
+                                                  const Triple& origin) {
+  if (values.ndim() != 4 || values.shape(3) != 6)
+    refuse("TensorGridField: values has the shape ", shape_text(values),
+           "; it takes (X, Y, Z, 6), entries xx,yy,zz,xy,xz,yz.");
+  const auto v = values.unchecked<4>();
+  const Index3 nodes{static_cast<int>(v.shape(0)), static_cast<int>(v.shape(1)),
+                     static_cast<int>(v.shape(2))};
+  TensorGridField::Bricks bricks;
+  for (int e = 0; e < 6; ++e)
+    bricks[e] = std::make_shared<BrickGrid>(
+        nodes, [&](int i, int j, int k) { return static_cast<float>(v(i, j, k, e)); });
+  const Vec3 size = vec_or_number(voxel_size, "TensorGridField: voxel_size");
+  check_positive("TensorGridField: voxel_size", size);
+  check_finite("TensorGridField: origin", to_vec(origin));
+  const Affine map{{Vec3{size.x, 0, 0}, Vec3{0, size.y, 0}, Vec3{0, 0, size.z}}, to_vec(origin)};
+  return std::make_shared<TensorGridField>(std::move(bricks), map, [](const Index3& at) {
+    std::ostringstream text;
+    text << "TensorGridField: values[" << at[0] << ", " << at[1] << ", " << at[2] << ']';
+    return text.str();
+  });
+}
+
+Array tensors_at(const TensorField& field, const Array& points) {
+  check_points(points);
+  Array out({points.shape(0), py::ssize_t{6}});
+  for (py::ssize_t i = 0; i < points.shape(0); ++i) {
+    const SymMat3 a = field.value(row(points, i));
+    for (int e = 0; e < 6; ++e) out.mutable_at(i, e) = a[e];
+  }
+  return out;
+}
+
+Array tensor_gradients_at(const TensorField& field, const Array& points) {
+  check_points(points);
+  Array out({points.shape(0), py::ssize_t{3}, py::ssize_t{6}});
+  for (py::ssize_t i = 0; i < points.shape(0); ++i) {
+    const TensorSample s = field.sample(row(points, i));
+    for (int c = 0; c < 3; ++c)
+      for (int e = 0; e < 6; ++e) out.mutable_at(i, c, e) = s.gradient[c][e];
+  }
+  return out;
 }
 
 py::object support_of(const Field& field) {
@@ -191,9 +239,42 @@ field(points (N, 3)) -> (N,); field.gradient(points) -> (N, 3). Fields add to fi
                              "continued; None if there is none.");
 }
 
+void bind_tensor_field(py::module_& m) {
+  py::class_<TensorField, SharedTensorField>(
+      m, "TensorField",
+      "A field of symmetric positive definite matrices, entries xx,yy,zz,xy,xz,yz: squared length "
+      "scales A(x).")
+      .def("__call__", &tensors_at, "points"_a, "Entries (N, 6) at points (N, 3).")
+      .def("gradient", &tensor_gradients_at, "points"_a,
+           "Exact derivatives (N, 3, 6) of the entries, as they are interpolated, by x, y and z.")
+      .def(
+          "transformed",
+          [](const SharedTensorField& f, const Array& matrix) -> SharedTensorField {
+            return std::make_shared<TransformedTensorField>(f, affine_argument(matrix));
+          },
+          "matrix"_a,
+          "The field moved by an affine matrix M (4, 4), as the length scales of a process that is "
+          "moved: M A(M⁻¹x) Mᵀ.")
+      .def_property_readonly(
+          "eigenvalues",
+          [](const TensorField& f) {
+            const Range r = f.eigenvalues();
+            return std::pair(r.min, r.max);
+          },
+          "Certified (least, greatest) eigenvalue over all space.");
+  py::class_<TensorGridField, TensorField, std::shared_ptr<TensorGridField>>(
+      m, "TensorGridField",
+      R"(A regular grid of symmetric positive definite matrices, each entry trilinear between nodes.
+
+values (X, Y, Z, 6), entries xx,yy,zz,xy,xz,yz, at least 2 nodes along each axis, kept in single precision: values[i, j, k] stands
+at origin + (i, j, k)·voxel_size. Outside the nodes' box: the nearest value. ValueError where a node's matrix is not positive definite.)")
+      .def(py::init(&make_tensor_grid), "values"_a, "voxel_size"_a, "origin"_a = Triple{0, 0, 0});
+}
+
 }  // namespace
 
 void bind_field(py::module_& m) {
+  bind_tensor_field(m);
   bind_line(m);
   bind_base(m);
 

@@ -13,6 +13,7 @@
 #include "field/mesh_bake.h"
 #include "field/vdb_field.h"
 #include "field/vdb_file.h"
+#include "field/vdb_tensor_field.h"
 
 namespace gpis {
 namespace py = pybind11;
@@ -60,9 +61,6 @@ py::list grids(const py::object& path) {
   }
   return out;
 }
-
-// The six entries xx,yy,zz,xy,xz,yz of `anisotropy` stand in two vector grids.
-const std::array<const char*, 2> kAnisotropyGrids{"anisotropy_diagonal", "anisotropy_offdiagonal"};
 
 void write(const py::object& path, const py::dict& grids) {
   VdbArrays arrays;
@@ -200,6 +198,19 @@ meaning: 'value', or 'variance' where the square root is to be taken. Its suppor
 stands the grid's background (level sets get their inside and outside first). A grid that its transform rotates or shears
 is continued by its nearest value. FileNotFoundError, or ValueError with a sentence: no grid of that name, another type,
 no active voxel, NaN or infinite voxels, negative variance, a frustum.)");
+  m.def(
+      "VdbTensorField",
+      [](const py::object& path) {
+        const std::string file = path_argument(path, "path");
+        py::gil_scoped_release release;
+        return std::const_pointer_cast<TensorField>(load_vdb_tensor_field(file));
+      },
+      "path"_a,
+      R"(A TensorField from the grids 'anisotropy_diagonal' (xx,yy,zz) and 'anisotropy_offdiagonal' (xy,xz,yz) of a .vdb file.
+
+Trilinear between the voxels of the box of the active ones of the first, the nearest value outside; entries are in object
+units whatever the grids' transform. FileNotFoundError, or ValueError with a sentence: no such grids, another type, different
+transforms, no active voxel, a matrix that is not positive definite.)");
   m.def("vdb_grids", &grids, "path"_a, R"(What a .vdb file holds: a list of dicts with
 
 name, type ('float', 'vec3s', ...), resolution (3,) nodes of the box of active voxels, min (3,) and max (3,) of these nodes

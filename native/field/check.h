@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/vec.h"
+#include "field/field.h"
 
 namespace gpis {
 
@@ -39,5 +40,8 @@ inline void check_direction(const char* what, const Vec3& v) {
   if (!(is_finite(v) && length(v) > 0))
     refuse("", what, " is ", v, "; it takes a direction of non-zero length.");
 }
+
+// Refuses an affine map that is not finite or flattens space; its least and greatest stretch.
+Range check_transform(const Affine& matrix);
 
 }  // namespace gpis

@@ -1,7 +1,5 @@
 #include "field/transformed_field.h"
 
-#include <Eigen/Dense>
-
 #include "field/check.h"
 #include "field/grid_field.h"
 
@@ -20,17 +18,7 @@ bool keeps_axes(const Mat3& m) {
 
 TransformedField::TransformedField(FieldPtr field, const Affine& matrix)
     : field_(std::move(field)) {
-  Eigen::Matrix3d m;
-  for (int i = 0; i < 3; ++i) {
-    check_finite("transformed: a row of the matrix", matrix.linear.row[i]);
-    for (int j = 0; j < 3; ++j) m(i, j) = matrix.linear.row[i][j];
-  }
-  check_finite("transformed: the translation", matrix.translation);
-  const Eigen::Vector3d stretch = m.jacobiSvd().singularValues();
-  const double least = stretch[2];
-  if (!(least > 1e-12 * stretch[0]))
-    refuse("transformed: the matrix stretches by ", stretch[0], " at most and ", least,
-           " at least; it must not flatten space.");
+  const double least = check_transform(matrix).min;
   inverse_ = inverse(matrix);
   gradient_map_ = transpose(inverse_.linear);
 

@@ -3,14 +3,11 @@
 #include "field/check.h"
 #include "field/grid_field.h"
 #include "field/transformed_field.h"
+#include "field/vdb_bricks.h"
 #include "field/vdb_open.h"
 
 namespace gpis {
 namespace {
-
-std::string quoted(const std::string& path, const std::string& grid) {
-  return "Grid '" + grid + "' of \"" + path + "\"";
-}
 
 // Refuses what no field can be made of, counting it and naming the first voxel.
 template <class GridType>
@@ -51,34 +48,10 @@ FieldPtr make_field(const GridType& grid, const Affine& map, const std::string& 
   const auto read = [meaning](auto v) {
     return static_cast<float>(meaning == GridMeaning::variance ? std::sqrt(v) : v);
   };
-  const auto voxels = grid.getConstAccessor();
-  const openvdb::Coord low = box.min(), size = box.dim();
-  // A brick and its far nodes touch the leaves that hold its eight corners, and no others.
-  const auto constant = [&](int i, int j, int k) -> std::optional<float> {
-    std::optional<float> value;
-    for (int corner = 0; corner < 8; ++corner) {
-      const openvdb::Coord c =
-          low + openvdb::Coord(i + (corner & 1 ? 8 : 0), j + (corner & 2 ? 8 : 0),
-                               k + (corner & 4 ? 8 : 0));
-      if (voxels.probeConstLeaf(c)) return std::nullopt;
-      const float v = read(voxels.getValue(c));
-      if (value && *value != v) return std::nullopt;
-      value = v;
-    }
-    return value;
-  };
-  std::shared_ptr<const BrickGrid> bricks;
-  try {
-    bricks = std::make_shared<BrickGrid>(
-        Index3{size.x(), size.y(), size.z()},
-        [&](int i, int j, int k) { return read(voxels.getValue(low + openvdb::Coord(i, j, k))); },
-        constant);
-  } catch (const std::invalid_argument& e) {
-    refuse("", name, " cannot be used: ", e.what());
-  }
+  const auto bricks = vdb_bricks(grid, box, read, name);
 
   const double background = read(grid.background());
-  const Vec3 first{double(low.x()), double(low.y()), double(low.z())};
+  const Vec3 first{double(box.min().x()), double(box.min().y()), double(box.min().z())};
   const Vec3 diagonal{map.linear.row[0].x, map.linear.row[1].y, map.linear.row[2].z};
   bool along_axes = diagonal.x > 0 && diagonal.y > 0 && diagonal.z > 0;
   for (int i = 0; i < 3; ++i)
@@ -93,7 +66,7 @@ FieldPtr make_field(const GridType& grid, const Affine& map, const std::string& 
 
 FieldPtr load_vdb_field(const std::string& path, const std::string& grid, GridMeaning meaning) {
   const auto opened = open_vdb_grid(path, grid);
-  const std::string name = quoted(path, grid);
+  const std::string name = vdb_grid_quoted(path, grid);
   const Affine map = index_to_object(path, *opened);
   if (opened->isType<openvdb::FloatGrid>())
     return make_field(static_cast<const openvdb::FloatGrid&>(*opened), map, name, meaning);

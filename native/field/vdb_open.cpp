@@ -65,6 +65,10 @@ openvdb::GridBase::Ptr open_vdb_grid(const std::string& path, const std::string&
   });
 }
 
+std::string vdb_grid_quoted(const std::string& path, const std::string& grid) {
+  return "Grid '" + grid + "' of \"" + path + "\"";
+}
+
 // OpenVDB maps row vectors.
 Affine index_to_object(const std::string& path, const openvdb::GridBase& grid) {
   if (!grid.transform().isLinear())

@@ -15,6 +15,9 @@ std::vector<std::string> vdb_grid_names(const std::string& path);
 // name that is not there, and a transform that is not affine.
 openvdb::GridBase::Ptr open_vdb_grid(const std::string& path, const std::string& name);
 
+// How sentences name a grid: Grid 'mean' of "path".
+std::string vdb_grid_quoted(const std::string& path, const std::string& grid);
+
 // The map from index to object space. Refuses one that is not affine.
 Affine index_to_object(const std::string& path, const openvdb::GridBase& grid);
 

@@ -1,0 +1,161 @@
+#include "field/tensor_grid_field.h"
+
+#include <Eigen/Eigenvalues>
+
+#include "field/check.h"
+
+namespace gpis {
+namespace {
+
+Eigen::Vector3d eigenvalues_of(const SymMat3& a) {
+  Eigen::Matrix3d m;
+  m << a.xx, a.xy, a.xz, a.xy, a.yy, a.yz, a.xz, a.yz, a.zz;
+  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m, Eigen::EigenvaluesOnly).eigenvalues();
+}
+
+bool same(const SymMat3& a, const SymMat3& b) {
+  for (int i = 0; i < 6; ++i)
+    if (a[i] != b[i]) return false;
+  return true;
+}
+
+bool positive_definite(const SymMat3& a) {
+  return a.xx > 0 && Cholesky3(a).positive;
+}
+
+}  // namespace
+
+TensorGridField::TensorGridField(Bricks bricks, const Affine& index_to_object,
+                                 const std::function<std::string(const Index3&)>& node_name)
+    : bricks_(std::move(bricks)), object_to_index_(inverse(index_to_object)) {
+  check_nodes(node_name);
+  find_kinks();
+}
+
+SymMat3 TensorGridField::node(const Index3& at) const {
+  const Index3& n = bricks_[0]->nodes();
+  Index3 cell;
+  int corner = 0;
+  for (int i = 0; i < 3; ++i) {
+    cell[i] = std::min(at[i], n[i] - 2);
+    corner = 2 * corner + (at[i] - cell[i]);
+  }
+  SymMat3 a;
+  for (int e = 0; e < 6; ++e) {
+    const BrickGrid::Brick& brick = bricks_[e]->brick_of(cell);
+    a[e] = brick.min;
+    if (brick.values < 0) continue;
+    float c[8];
+    bricks_[e]->corners(brick, cell, c);
+    a[e] = c[corner];
+  }
+  return a;
+}
+
+// Eigenvalues are computed only where they leave the range found so far, which two factorisations
+// tell; where nothing changes from node to node, not even these.
+void TensorGridField::check_nodes(const std::function<std::string(const Index3&)>& node_name) {
+  const Index3& n = bricks_[0]->nodes();
+  Range range{kInfinity, -kInfinity};
+  SymMat3 last;
+  for (int i = 0; i < n[0]; ++i)
+    for (int j = 0; j < n[1]; ++j)
+      for (int k = 0; k < n[2]; ++k) {
+        const SymMat3 a = node({i, j, k});
+        if (same(a, last)) continue;
+        last = a;
+        if (range.max > 0 && positive_definite(a - SymMat3::identity(range.min)) &&
+            positive_definite(SymMat3::identity(range.max) - a))
+          continue;
+        const Eigen::Vector3d e = eigenvalues_of(a);
+        if (!(e[0] > 1e-12 * e[2]))
+          refuse("", node_name({i, j, k}), " is a matrix with the eigenvalue ", e[0],
+                 " (the largest is ", e[2],
+                 "); the anisotropy takes squared length scales, all of whose eigenvalues are "
+                 "positive.");
+        range.min = std::min(range.min, e[0]);
+        range.max = std::max(range.max, e[2]);
+      }
+  eigenvalues_ = range;
+}
+
+// At a face across axis i, ∂_i A jumps by the second difference D of the nodes there. Where
+// -cA <= D <= cA at the nodes, the same holds between them; c is at most the root of tr((A⁻¹D)²).
+void TensorGridField::find_kinks() {
+  const Index3& n = bricks_[0]->nodes();
+  for (int axis = 0; axis < 3; ++axis) {
+    double largest = 0;
+    Index3 at;
+    for (at[0] = 0; at[0] < n[0]; ++at[0])
+      for (at[1] = 0; at[1] < n[1]; ++at[1])
+        for (at[2] = 0; at[2] < n[2]; ++at[2]) {
+          Index3 before = at, after = at;
+          before[axis] = std::max(at[axis] - 1, 0);
+          after[axis] = std::min(at[axis] + 1, n[axis] - 1);
+          const SymMat3 a = node(at), lower = node(before), upper = node(after);
+          if (same(a, lower) && same(a, upper)) continue;
+          const SymMat3 inverse_a = Cholesky3(a).inverse();
+          const Mat3 m = inverse_a.matrix() * (lower + upper - a * 2).matrix(), mt = transpose(m);
+          largest = std::max(largest, dot(m.row[0], mt.row[0]) + dot(m.row[1], mt.row[1]) +
+                                          dot(m.row[2], mt.row[2]));
+        }
+    kink_[axis] = std::sqrt(largest);
+  }
+}
+
+SymMat3 TensorGridField::value(const Vec3& p) const {
+  return sample(p).value;
+}
+
+TensorSample TensorGridField::sample(const Vec3& p) const {
+  const Vec3 x = object_to_index_.point(p);
+  const Index3& n = bricks_[0]->nodes();
+  Index3 cell;
+  Vec3 u;
+  bool outside[3];
+  for (int i = 0; i < 3; ++i) {
+    outside[i] = !(x[i] >= 0 && x[i] <= n[i] - 1);
+    cell[i] = x[i] >= 1 ? (x[i] < n[i] - 1 ? static_cast<int>(x[i]) : n[i] - 2) : 0;
+    u[i] = outside[i] ? (x[i] > 0 ? 1.0 : 0.0) : x[i] - cell[i];
+  }
+  TensorSample out;
+  SymMat3 along[3];  // derivatives by index
+  for (int e = 0; e < 6; ++e) {
+    const BrickGrid::Brick& brick = bricks_[e]->brick_of(cell);
+    out.value[e] = brick.min;
+    if (brick.values < 0) continue;
+    float c[8];
+    bricks_[e]->corners(brick, cell, c);
+    // Linear along x, then y, then z.
+    double v[4], dx[4];
+    for (int i = 0; i < 4; ++i) {
+      dx[i] = double{c[4 + i]} - c[i];
+      v[i] = c[i] + u.x * dx[i];
+    }
+    const double v0 = v[0] + u.y * (v[2] - v[0]), v1 = v[1] + u.y * (v[3] - v[1]);
+    out.value[e] = v0 + u.z * (v1 - v0);
+    const double d0 = dx[0] + u.y * (dx[2] - dx[0]), d1 = dx[1] + u.y * (dx[3] - dx[1]);
+    along[0][e] = d0 + u.z * (d1 - d0);
+    along[1][e] = (v[2] - v[0]) + u.z * ((v[3] - v[1]) - (v[2] - v[0]));
+    along[2][e] = v1 - v0;
+  }
+  for (int i = 0; i < 3; ++i)  // ∂A/∂x_i = Σ_j ∂index_j/∂x_i ∂A/∂index_j
+    for (int j = 0; j < 3; ++j)
+      if (!outside[j])
+        out.gradient[i] = out.gradient[i] + along[j] * object_to_index_.linear.row[j][i];
+  return out;
+}
+
+// ⅛ tr((A⁻¹J)²) <= (3/8) c² for J between -cA and cA.
+TensorField::Kinks TensorGridField::kinks(const Vec3& d) const {
+  const Vec3 u = object_to_index_.vector(d);
+  Kinks out;
+  for (int i = 0; i < 3; ++i) {
+    const double jump = std::sqrt(3.0 / 8) * kink_[i] * std::abs(u[i]);
+    out.once += jump;
+    out.rate += jump * std::abs(u[i]);
+  }
+  return out;
+}
+
+}  // namespace gpis

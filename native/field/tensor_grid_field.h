@@ -1,0 +1,39 @@
+// A regular grid of symmetric positive definite matrices; each of the six entries is trilinear
+// between nodes, which keeps the matrices positive definite: a convex combination of such matrices
+// is one (math.md §2). Outside the nodes' box: the nearest value.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "field/brick_grid.h"
+#include "field/tensor_field.h"
+
+namespace gpis {
+
+class TensorGridField final : public TensorField {
+ public:
+  using Bricks = std::array<std::shared_ptr<const BrickGrid>, 6>;  // xx, yy, zz, xy, xz, yz
+
+  // `node_name(i, j, k)` is how a sentence names a node. Refuses a matrix that is not positive
+  // definite, naming its node and eigenvalues.
+  TensorGridField(Bricks bricks, const Affine& index_to_object,
+                  const std::function<std::string(const Index3&)>& node_name);
+
+  SymMat3 value(const Vec3& p) const override;
+  TensorSample sample(const Vec3& p) const override;
+  Range eigenvalues() const override { return eigenvalues_; }
+  Kinks kinks(const Vec3& d) const override;
+
+ private:
+  SymMat3 node(const Index3& at) const;
+  void check_nodes(const std::function<std::string(const Index3&)>& node_name);
+  void find_kinks();
+
+  Bricks bricks_;
+  Affine object_to_index_;
+  Range eigenvalues_;
+  double kink_[3] = {0, 0, 0};  // largest relative jump of ∂A at faces across each axis of the grid
+};
+
+}  // namespace gpis
