@@ -1,7 +1,5 @@
 #include "binding/arguments.h"
 
-#include <pybind11/numpy.h>
-
 #include <filesystem>
 
 #include "field/constant_field.h"
@@ -47,12 +45,37 @@ void check_replaceable(const std::string& path, const std::string& name) {
 }
 
 Vec3 vec_or_number(const py::handle& value, const std::string& name) {
-  const auto a = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(value);
+  const auto a = NumberArray::ensure(value);
   if (a && a.ndim() == 0) return Vec3{1, 1, 1} * *a.data();
   if (a && a.ndim() == 1 && a.shape(0) == 3) return {a.at(0), a.at(1), a.at(2)};
   PyErr_Clear();
   throw std::invalid_argument(name + " must be a number or three numbers, it is " +
                               py::repr(value).cast<std::string>() + ".");
+}
+
+std::vector<Vec3> points_argument(const py::handle& value, const std::string& name) {
+  const auto a = NumberArray::ensure(value);
+  if (!a || a.ndim() != 2 || a.shape(1) != 3) {
+    PyErr_Clear();
+    throw std::invalid_argument(name + " must be an array of shape (N, 3).");
+  }
+  std::vector<Vec3> points(a.shape(0));
+  for (py::ssize_t i = 0; i < a.shape(0); ++i) {
+    points[i] = {a.at(i, 0), a.at(i, 1), a.at(i, 2)};
+    if (!is_finite(points[i]))
+      throw std::invalid_argument(name + "[" + std::to_string(i) +
+                                  "] is not finite: every coordinate must be a number.");
+  }
+  return points;
+}
+
+NumberArray numbers_argument(const py::handle& value, py::ssize_t count, const char* sentence) {
+  const auto a = NumberArray::ensure(value);
+  if (!a || a.ndim() != 1 || a.shape(0) != count) {
+    PyErr_Clear();
+    throw std::invalid_argument(sentence);
+  }
+  return a;
 }
 
 py::dict counters_dict(const Counters& counters) {

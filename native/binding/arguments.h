@@ -1,15 +1,20 @@
 // Python arguments that several bindings take, and results that several give.
 #pragma once
 
+#include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
 #include <string>
+#include <vector>
 
 #include "core/counters.h"
 #include "field/field.h"
 #include "process/gaussian_process.h"
 
 namespace gpis {
+
+using NumberArray =
+    pybind11::array_t<double, pybind11::array::c_style | pybind11::array::forcecast>;
 
 // A field, or a number as a constant field. `name` says in the error whose argument it was.
 FieldPtr field_argument(const pybind11::handle& value, const std::string& name);
@@ -37,6 +42,13 @@ void check_replaceable(const std::string& path, const std::string& name);
 
 // Three numbers, or one that stands for all three.
 Vec3 vec_or_number(const pybind11::handle& value, const std::string& name);
+
+// An array (N, 3) of finite numbers.
+std::vector<Vec3> points_argument(const pybind11::handle& value, const std::string& name);
+
+// An array of `count` numbers; `sentence` refuses anything else.
+NumberArray numbers_argument(const pybind11::handle& value, pybind11::ssize_t count,
+                             const char* sentence);
 
 pybind11::dict counters_dict(const Counters& counters);
 

@@ -1,4 +1,4 @@
-// Kernels, the Gaussian process, and its first hits.
+// The Gaussian process and its first hits.
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
@@ -18,59 +18,17 @@ namespace py = pybind11;
 using namespace py::literals;
 namespace {
 
-using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
+using Array = NumberArray;
 
 // As render takes; TBB overflows its stack at a million.
 constexpr int kMostThreads = 1024;
-
-std::vector<Vec3> points_argument(const py::handle& value, const char* name) {
-  const Array a = Array::ensure(value);
-  if (!a || a.ndim() != 2 || a.shape(1) != 3) {
-    PyErr_Clear();
-    throw std::invalid_argument(std::string(name) + " must be an array of shape (N, 3).");
-  }
-  std::vector<Vec3> points(a.shape(0));
-  for (py::ssize_t i = 0; i < a.shape(0); ++i) {
-    points[i] = {a.at(i, 0), a.at(i, 1), a.at(i, 2)};
-    if (!is_finite(points[i]))
-      throw std::invalid_argument(std::string(name) + "[" + std::to_string(i) +
-                                  "] is not finite: every coordinate must be a number.");
-  }
-  return points;
-}
-
-Array numbers_argument(const py::handle& value, py::ssize_t count, const char* sentence) {
-  const Array a = Array::ensure(value);
-  if (!a || a.ndim() != 1 || a.shape(0) != count) {
-    PyErr_Clear();
-    throw std::invalid_argument(sentence);
-  }
-  return a;
-}
-
-SquaredExponential make_kernel(const py::object& length_scale, const py::object& rotation) {
-  const Vec3 l = vec_or_number(length_scale, "length_scale");
-  Mat3 axes;
-  if (!rotation.is_none()) {
-    const Array q = numbers_argument(rotation, 4, "rotation must be a quaternion (w, x, y, z).");
-    const double n =
-        std::sqrt(q.at(0) * q.at(0) + q.at(1) * q.at(1) + q.at(2) * q.at(2) + q.at(3) * q.at(3));
-    if (!(n > 0) || !std::isfinite(n))
-      throw std::invalid_argument("rotation must be a quaternion that is not zero.");
-    const double w = q.at(0) / n, x = q.at(1) / n, y = q.at(2) / n, z = q.at(3) / n;
-    axes = {{Vec3{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
-             Vec3{2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
-             Vec3{2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}}};
-  }
-  return SquaredExponential(l, axes);
-}
 
 Eigen::MatrixXd covariance_matrix(const GaussianProcess& gp, const std::vector<Vec3>& x,
                                   const std::vector<Vec3>& y) {
   Eigen::MatrixXd k(x.size(), y.size());
   for (std::size_t i = 0; i < x.size(); ++i)
     for (std::size_t j = 0; j < y.size(); ++j)
-      k(i, j) = gp.sigma->value(x[i]) * gp.sigma->value(y[j]) * gp.kernel.covariance(x[i], y[j]);
+      k(i, j) = gp.sigma->value(x[i]) * gp.sigma->value(y[j]) * gp.kernel->covariance(x[i] - y[j]);
   return k;
 }
 
@@ -222,35 +180,6 @@ Array line_values_array(const py::object& gp, const py::object& origins,
 }  // namespace
 
 void bind_process(py::module_& m) {
-  py::class_<SquaredExponential>(
-      m, "SquaredExponential",
-      "Squared-exponential correlation exp(-q²/2), q² = rᵀA⁻¹r.\n\n"
-      "length_scale: number or (3,), in the unit of the process's space; rotation: quaternion\n"
-      "(w, x, y, z) that turns the axes of the length scales. Seyb et al. 2024.")
-      .def(py::init(&make_kernel), "length_scale"_a, py::kw_only(), "rotation"_a = py::none())
-      .def_property_readonly("variance", [](const SquaredExponential&) { return 1.0; })
-      .def(
-          "__call__",
-          [](const SquaredExponential& k, const py::object& x, const py::object& y) {
-            const auto a = points_argument(x, "x"), b = points_argument(y, "y");
-            Array out({a.size(), b.size()});
-            for (std::size_t i = 0; i < a.size(); ++i)
-              for (std::size_t j = 0; j < b.size(); ++j)
-                out.mutable_at(i, j) = k.covariance(a[i], b[j]);
-            return out;
-          },
-          "x"_a, "y"_a, "Correlation of g between points x (N, 3) and y (M, 3): (N, M).")
-      .def(
-          "derivative_variance",
-          [](const SquaredExponential& k, const py::object& direction) {
-            const Array d = numbers_argument(direction, 3, "direction must hold three numbers.");
-            const Vec3 v{d.at(0), d.at(1), d.at(2)};
-            if (!is_finite(v)) throw std::invalid_argument("direction must hold finite numbers.");
-            const Vec3 w = k.whitening() * v;
-            return dot(w, w);
-          },
-          "direction"_a, "Variance of the derivative of g along `direction` (3,): dᵀA⁻¹d.");
-
   py::class_<GaussianProcess, std::shared_ptr<GaussianProcess>>(
       m, "GaussianProcess",
       "f = mean + sigma·g: outside where f > 0, the surface is f = 0.\n\n"
@@ -259,12 +188,12 @@ void bind_process(py::module_& m) {
       "kernel: correlation of g. bounds: (min (3,), max (3,)); outside there is no surface. A mean "
       "on a grid bounds the\n"
       "process to its nodes.")
-      .def(py::init([](const py::object& mean, const py::object& sigma,
-                       const SquaredExponential& kernel, const py::object& bounds) {
+      .def(py::init([](const py::object& mean, const py::object& sigma, const py::object& kernel,
+                       const py::object& bounds) {
              auto gp = std::make_shared<GaussianProcess>();
              gp->mean = field_argument(mean, "mean");
              gp->sigma = field_argument(sigma, "sigma");
-             gp->kernel = kernel;
+             gp->kernel = instance_argument<Kernel>(kernel, "kernel", "a kernel");
              if (!bounds.is_none()) {
                const auto corners = points_argument(bounds, "bounds");
                if (corners.size() != 2)

@@ -10,6 +10,7 @@ namespace gpis {
 void bind_build_info(pybind11::module_& m);
 void bind_field(pybind11::module_& m);
 void bind_vdb(pybind11::module_& m);
+void bind_kernel(pybind11::module_& m);
 void bind_process(pybind11::module_& m);
 void bind_scene(pybind11::module_& m);
 void bind_film(pybind11::module_& m);

@@ -20,6 +20,7 @@ PYBIND11_MODULE(gpis_native, m) {
   gpis::bind_build_info(m);
   gpis::bind_field(m);
   gpis::bind_vdb(m);
+  gpis::bind_kernel(m);
   gpis::bind_process(m);
   gpis::bind_scene(m);
   gpis::bind_film(m);

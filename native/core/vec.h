@@ -93,6 +93,15 @@ inline Mat3 operator*(const Mat3& a, const Mat3& b) {
     r.row[i] = {dot(a.row[i], bt.row[0]), dot(a.row[i], bt.row[1]), dot(a.row[i], bt.row[2])};
   return r;
 }
+inline Mat3 operator+(const Mat3& a, const Mat3& b) {
+  return {{a.row[0] + b.row[0], a.row[1] + b.row[1], a.row[2] + b.row[2]}};
+}
+inline Mat3 operator*(const Mat3& m, double s) {
+  return {{m.row[0] * s, m.row[1] * s, m.row[2] * s}};
+}
+inline Mat3 outer(const Vec3& a, const Vec3& b) {
+  return {{b * a.x, b * a.y, b * a.z}};
+}
 inline double determinant(const Mat3& m) {
   return dot(m.row[0], cross(m.row[1], m.row[2]));
 }

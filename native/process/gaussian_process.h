@@ -1,4 +1,4 @@
-// The model: f = mean + sigma·g, g a zero-mean unit-variance Gaussian process; f > 0 outside, the
+// The model: f = mean + sigma·g, g a zero-mean Gaussian process; f > 0 outside, the
 // surface is f = 0 (math.md §1-2).
 #pragma once
 
@@ -6,14 +6,14 @@
 #include <optional>
 
 #include "field/field.h"
-#include "kernel/squared_exponential.h"
+#include "kernel/kernel.h"
 
 namespace gpis {
 
 struct GaussianProcess {
   FieldPtr mean;
   FieldPtr sigma;  // standard deviation, never variance
-  SquaredExponential kernel;
+  KernelPtr kernel;
   std::optional<Box3> bounds;  // outside there is no surface
 };
 

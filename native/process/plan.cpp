@@ -100,6 +100,17 @@ Box3 intersection(const Box3& a, const Box3& b) {
   return r;
 }
 
+// The convolution and the dense path know one stationary squared exponential of unit variance.
+Mat3 squared_exponential_whitening(const Kernel& kernel) {
+  const auto terms = kernel.terms();
+  if (!terms || terms->size() != 1 || terms->front().weight != 1 ||
+      terms->front().radial.family != Radial::Family::squared_exponential ||
+      length(terms->front().wave_vector) != 0 || !(determinant(terms->front().whitening) != 0))
+    refuse("No sampler serves the kernel ", kernel.describe(),
+           " yet: take a SquaredExponential of finite length scales.");
+  return terms->front().whitening;
+}
+
 }  // namespace
 
 PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Sampler sampler,
@@ -130,18 +141,19 @@ PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Sampler sa
   // (definitions B13).
   const double diagonal = length(plan.bounds.max - plan.bounds.min);
   const double lengths =
-      std::isfinite(diagonal) ? diagonal / process->kernel.min_length_scale() : 1e4;
+      std::isfinite(diagonal) ? diagonal / process->kernel->min_length_scale() : 1e4;
   plan.skip_deviations =
       std::sqrt(std::max(16.0, 2 * std::log(std::max(1.0, lengths) / (kPi * missed_root))));
   plan.sigma_max = sigma.max;
   // A certain surface (σ = 0) still needs a last step across it: stop a little before the root.
   plan.skip_threshold =
-      std::max(plan.skip_deviations * sigma.max, 1e-4 * process->kernel.min_length_scale());
+      std::max(plan.skip_deviations * sigma.max, 1e-4 * process->kernel->min_length_scale());
   plan.smooth_scale = std::min(process->mean->smooth_scale(), process->sigma->smooth_scale());
   plan.mean_lipschitz = process->mean->lipschitz();
   plan.sigma_lipschitz = process->sigma->lipschitz();
+  plan.whitening = squared_exponential_whitening(*process->kernel);
   // B⁻ᵀ of a diagonal times a rotation.
-  plan.unwhitening = transpose(inverse(process->kernel.whitening()));
+  plan.unwhitening = transpose(inverse(plan.whitening));
 
   if (sigma.max == 0) {
     plan.sampler = Sampler::convolution;

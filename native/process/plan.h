@@ -18,7 +18,7 @@ struct PlannedLine {
   double smooth_scale = kInfinity;
   double mean_lipschitz = kInfinity, sigma_lipschitz = kInfinity;
   Box3 bounds;                             // object space; outside there is no surface
-  Mat3 unwhitening;                        // B⁻ᵀ
+  Mat3 whitening, unwhitening;             // B with A⁻¹ = BᵀB, and B⁻ᵀ
   Sampler sampler = Sampler::convolution;  // resolved, never automatic
   std::string sampler_reason;
 

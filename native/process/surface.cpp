@@ -52,8 +52,7 @@ double ProcessSurface::first_hit(Line& line, const Ray& ray, double t_max, const
     ++counters.line_skipped;
     return kInfinity;
   }
-  const SquaredExponential& kernel = process_->kernel;
-  const Vec3 whitened = kernel.whitening() * l.direction;
+  const Vec3 whitened = planned_->whitening * l.direction;
   l.inverse_length = length(whitened);
   const Frame frame(whitened / l.inverse_length);
   l.e1 = frame.s;
@@ -136,7 +135,7 @@ GradientLaw ProcessSurface::gradient_law(const Line& line, double t) const {
   const double q = l.q_of(t);
   const double c = l.has_gamma ? std::exp(-0.5 * q * q) : 0;
   const double one_minus_c2 = l.has_gamma ? -std::expm1(-q * q) : 1;
-  const Mat3 bt = transpose(process_->kernel.whitening());
+  const Mat3 bt = transpose(planned_->whitening);
   const Mat3 to_world = transpose(world_to_object_.linear);
   const Vec3 known = bt * (l.e1 * (c * l.gamma1) + l.e2 * (c * l.gamma2) + l.ed * dg);
   GradientLaw law;

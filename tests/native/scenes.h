@@ -6,6 +6,7 @@
 #include "field/constant_field.h"
 #include "field/sphere_field.h"
 #include "integrator/path_tracer.h"
+#include "kernel/stationary_kernel.h"
 #include "scene/scene.h"
 
 namespace gpis::test {
@@ -96,8 +97,7 @@ inline std::shared_ptr<GaussianProcess> sphere_process(double length_scale, doub
   const Vec3 r{reach, reach, reach};
   return std::make_shared<GaussianProcess>(GaussianProcess{
       std::make_shared<SphereField>(center, 1), std::make_shared<ConstantField>(sigma),
-      SquaredExponential({length_scale, length_scale, length_scale}),
-      Box3{center - r, center + r}});
+      std::make_shared<SquaredExponential>(length_scale), Box3{center - r, center + r}});
 }
 
 inline void add_process(SceneDescription& scene, std::shared_ptr<const GaussianProcess> process,

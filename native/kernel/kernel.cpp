@@ -1,0 +1,31 @@
+#include "kernel/kernel.h"
+
+#include <charconv>
+
+namespace gpis {
+
+double Term::covariance(const Vec3& r) const {
+  return weight * radial.value(distance(r)) * std::cos(dot(wave_vector, r));
+}
+
+double Term::max_inverse_length() const {
+  double longest = 0;
+  for (const Vec3& row : whitening.row) longest = std::max(longest, length(row));
+  return longest;
+}
+
+double Kernel::derivative_variance(const Vec3& direction) const {
+  if (!differentiable()) return kInfinity;
+  return dot(direction, derivative_covariance() * direction);
+}
+
+std::string number_text(double v) {
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof text, v).ptr};
+}
+
+std::string vector_text(const Vec3& v) {
+  return "(" + number_text(v.x) + ", " + number_text(v.y) + ", " + number_text(v.z) + ")";
+}
+
+}  // namespace gpis

@@ -1,0 +1,34 @@
+// k₁ + k₂: g is the sum of two independent processes.
+#pragma once
+
+#include "kernel/kernel.h"
+
+namespace gpis {
+
+class SumKernel : public Kernel {
+ public:
+  SumKernel(KernelPtr a, KernelPtr b) : a_(std::move(a)), b_(std::move(b)) {}
+
+  double covariance(const Vec3& r) const override { return a_->covariance(r) + b_->covariance(r); }
+  Vec3 gradient(const Vec3& r) const override { return a_->gradient(r) + b_->gradient(r); }
+  Mat3 mixed(const Vec3& r) const override { return a_->mixed(r) + b_->mixed(r); }
+  bool differentiable() const override { return a_->differentiable() && b_->differentiable(); }
+  double min_length_scale() const override {
+    return std::min(a_->min_length_scale(), b_->min_length_scale());
+  }
+  std::optional<std::vector<Term>> terms() const override {
+    auto terms = a_->terms();
+    const auto more = b_->terms();
+    if (!terms || !more || terms->size() + more->size() > kMaxTerms) return std::nullopt;
+    terms->insert(terms->end(), more->begin(), more->end());
+    return terms;
+  }
+  std::string describe() const override {
+    return "(" + a_->describe() + " + " + b_->describe() + ")";
+  }
+
+ private:
+  KernelPtr a_, b_;
+};
+
+}  // namespace gpis
