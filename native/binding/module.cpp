@@ -22,6 +22,7 @@ PYBIND11_MODULE(gpis_native, m) {
   gpis::bind_vdb(m);
   gpis::bind_kernel(m);
   gpis::bind_process(m);
+  gpis::bind_realisation(m);
   gpis::bind_scene(m);
   gpis::bind_film(m);
   gpis::bind_render(m);

@@ -16,8 +16,7 @@ double Term::max_inverse_length() const {
 
 double Kernel::derivative_variance(const Vec3& direction) const {
   if (!differentiable()) return kInfinity;
-  // A quadratic form of a positive semi-definite matrix: below 0 by rounding alone.
-  return std::max(0.0, dot(direction, derivative_covariance() * direction));
+  return dot(direction, derivative_covariance() * direction);
 }
 
 std::string number_text(double v) {

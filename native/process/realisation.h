@@ -1,0 +1,50 @@
+// Sampler 6: one sample of g in all of space, with values and gradients at any point in any order
+// (math.md §5.6): the ground truth for the samplers of lines, the memory `global`, and grids for
+// people to look at. A sum of independent parts, one for each term of the kernel's normal form:
+// lattice convolution for squared-exponential and constant terms, random spectral features for the
+// others.
+#pragma once
+
+#include "core/counters.h"
+#include "process/lattice_field.h"
+#include "process/spectral_field.h"
+
+namespace gpis {
+
+class Realisation {
+ public:
+  // Where it will be asked for next: close to the last point, on rays, or on whole rows of a grid.
+  enum class Access { rays, rows };
+  // Throws std::invalid_argument where the kernel has no normal form.
+  Realisation(const Kernel& kernel, Access access);
+
+  // Another realisation, a pure function of (seed, time). `time` in temporal length scales: the
+  // realisations of one seed at two times are correlated as exp(-Δ²/2).
+  void draw(std::uint64_t seed, std::optional<double> time);
+
+  FieldSample sample(const Vec3& x);
+
+  // The restriction to o + t d: values, and slopes per t.
+  void set_line(const Vec3& o, const Vec3& d);
+  void on_line(double t, double& g, double& dg);
+  // Standard deviation of the fourth derivative along the line.
+  double fourth_derivative() const;
+
+  // Values at origin + (i, j, k)·spacing, 0 <= i, j, k < size; g[(i·J + j)·K + k].
+  void fill(const Vec3& origin, double spacing, const std::array<int, 3>& size, float* g);
+
+  // Normals drawn so far.
+  std::uint64_t normals() const { return noise_.drawn() + spectral_normals_; }
+  // For plans: what it is made of and how Gaussian it is.
+  std::string describe() const;
+
+ private:
+  std::vector<LatticeField> lattices_;
+  std::vector<SpectralField> spectra_;
+  LatticeNoise noise_;
+  std::uint64_t spectral_normals_ = 0;
+  Vec3 origin_, direction_;
+  std::vector<double> row_;
+};
+
+}  // namespace gpis
