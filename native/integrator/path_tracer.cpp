@@ -171,13 +171,13 @@ void PathTracer::Impl::remember_others(const Vertex& v) {
     const ProcessSurface& surface = scene.stochastic[i].surface;
     if (!met[i] || static_cast<int>(i) == v.surface || surface.memory() == Memory::none) continue;
     if (!surface.sampled_at(lines[i], v.t)) continue;
-    const double value = surface.value(lines[i], v.t);
+    const double value = surface.value(lines[i], v.t, *rng);
     if (!(value > 0)) {
       ++counters->states_inside;
       continue;
     }
     const Vec3 gradient = surface.memory() == Memory::renewal_plus
-                              ? draw(surface.gradient_law(lines[i], v.t))
+                              ? draw(surface.gradient_law(lines[i], v.t, *rng))
                               : Vec3{};
     memory[i] = surface.state(value, gradient);
   }
@@ -227,7 +227,7 @@ std::optional<ScatterSample> PathTracer::Impl::scatter_at(const Ray& ray, const 
   }
 
   const ProcessSurface& surface = scene.stochastic[v.surface].surface;
-  const GradientLaw law = surface.gradient_law(lines[v.surface], v.t);
+  const GradientLaw law = surface.gradient_law(lines[v.surface], v.t, *rng);
   const Vec3 gradient = draw(law);
   memory[v.surface] = surface.state(0, gradient);
   normal = normalize(gradient);

@@ -16,7 +16,8 @@ double Term::max_inverse_length() const {
 
 double Kernel::derivative_variance(const Vec3& direction) const {
   if (!differentiable()) return kInfinity;
-  return dot(direction, derivative_covariance() * direction);
+  // A quadratic form of a positive semi-definite matrix: below 0 by rounding alone.
+  return std::max(0.0, dot(direction, derivative_covariance() * direction));
 }
 
 std::string number_text(double v) {

@@ -10,21 +10,6 @@ const double kSqrt3 = std::sqrt(3.0), kSqrt5 = std::sqrt(5.0);
 // Wong 1966: κ = (3/2) e^{-aq} - (1/2) e^{-bq}, a = 1/√3, b = √3.
 const double kWongA = 1 / kSqrt3, kWongB = kSqrt3;
 
-// (κ'' - κ'/q)/q of Wong for small q, where the closed form cancels: Σ_{n>=3} n(n-2) c_n q^{n-3}
-// with κ = Σ c_n qⁿ.
-double wong_excess_over_q(double q) {
-  double a = 1, b = 1, power = 1, sum = 0;  // (-a)ⁿ/n!, (-b)ⁿ/n!, q^{n-3}
-  for (int n = 1; n <= 22; ++n) {
-    a *= -kWongA / n;
-    b *= -kWongB / n;
-    if (n < 3) continue;
-    sum += n * (n - 2) * (1.5 * a - 0.5 * b) * power;
-    power *= q;
-  }
-  return sum;
-}
-constexpr double kWongSeries = 0.5;  // the series has converged to rounding below it
-
 // (1 + q²/2α)^{-α-n}.
 double rational_power(double q, double alpha, int n) {
   return std::exp(-(alpha + n) * std::log1p(q * q / (2 * alpha)));
@@ -97,7 +82,6 @@ double Radial::excess(double q) const {
     case Family::rational_quadratic:
       return (1 + 1 / alpha) * q * q * rational_power(q, alpha, 2);
     case Family::wong:
-      if (q < kWongSeries) return q * wong_excess_over_q(q);
       return 0.5 * std::exp(-kWongA * q) - 1.5 * std::exp(-kWongB * q) - slope_over_q(q);
   }
   return 0;
@@ -117,8 +101,6 @@ double Radial::psi2(double Q) const {
     case Family::matern32:
       return 0.75 * kSqrt3 / q * std::exp(-kSqrt3 * q);
     case Family::wong:
-      if (q < kWongSeries) return 0.25 * wong_excess_over_q(q) / q;
-      return excess(q) / (4 * Q);
     case Family::matern12:
       return excess(q) / (4 * Q);
   }

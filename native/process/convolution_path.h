@@ -8,20 +8,57 @@
 #include <cmath>
 #include <vector>
 
-#include "core/counters.h"
-#include "core/rng.h"
+#include "process/gaussian_process.h"
+#include "process/radial_line.h"
 
 namespace gpis {
 
 class ConvolutionPath {
  public:
-  static constexpr double kStep = 0.5;  // h, also the march's natural step
-  static constexpr int kNodes = 16;     // nodes in reach of one cell [kh, (k+1)h): k-7 … k+8
+  struct Plan {
+    Plan(const GaussianProcess& process, const Box3& bounds);
+    double correlation_error = 9e-8;
+    RadialLine::Plan line;
+  };
 
-  void reset(double /*reach*/, Counters&) {
+  void reset(const Plan& plan, const LineGeometry& line, double anchor, double, Counters&) {
+    line_.reset(plan.line, line, anchor);
+    step_ = kStep / line_.inverse_length();
+    const double h2 = line_.inverse_length() * line_.inverse_length();
+    deviation_ = kDeviation * h2 * h2;
+    conditioned_ = false;
     nodes_.clear();
     runs_.clear();
   }
+
+  double step() const { return step_; }
+  double value_deviation() const { return 1; }
+  void slope_law(double, double& mean, double& deviation) const {
+    mean = 0;
+    deviation = line_.slope_deviation();
+  }
+
+  void start_free(Rng& rng, Counters& counters, double& g, double& dg) {
+    prepare(0, rng, counters);
+    at_left(0, g, dg);
+  }
+
+  // By Matheron's rule (math.md §5.1): g(q) += κ(q)(Δ₀ + qΔ₁).
+  double start(const PathStart& known, Rng& rng, Counters& counters) {
+    prepare(0, rng, counters);
+    double g, dg;
+    at(0, line_.anchor(), rng, g, dg);
+    conditioned_ = true;
+    delta_value_ = known.value - g;
+    // Conditioned on the value alone, g - ĝ = κ(q)(g₀ - ĝ(0)) has no slope at q = 0.
+    const double slope = known.slope_known ? known.slope : dg;
+    delta_slope_ = line_.per_length(slope - dg);
+    if (known.gradient_known) line_.remember(known.gradient);
+    // max κ = 1, max qκ = .607.
+    pull_ = std::max(0.0, -known.value) + 0.61 * std::max(0.0, -line_.per_length(slope));
+    return slope;
+  }
+  double pull(double t) const { return conditioned_ && line_.q(t) < 6 ? pull_ : 0; }
 
   // Draw what the cell [kh, (k+1)h) needs. Cells come in increasing order; a gap wider than the
   // kernel starts a new run.
@@ -34,15 +71,21 @@ class ConvolutionPath {
     }
   }
 
-  // g and dg/dq at the ends of a cell, q = kh and (k+1)h: fixed weights. The node at distance 4 is
-  // left out on both sides, so that neighbouring cells agree to the last bit.
-  void at_left(long cell, double& g, double& dg) const { ends(cell, kTable.left, g, dg); }
-  void at_right(long cell, double& g, double& dg) const { ends(cell, kTable.right, g, dg); }
+  // At the ends of a cell, q = kh and (k+1)h: fixed weights. The node at distance 4 is left out on
+  // both sides, so that neighbouring cells agree to the last bit.
+  void at_left(long cell, double& g, double& dg) const {
+    ends(cell, kTable.left, g, dg);
+    condition(cell * kStep, g, dg);
+  }
+  void at_right(long cell, double& g, double& dg) const {
+    ends(cell, kTable.right, g, dg);
+    condition((cell + 1) * kStep, g, dg);
+  }
 
-  // g and dg/dq anywhere in [kh, (k+1)h], by ONE node set for the whole cell (definitions E5).
-  // The weights follow from two exponentials: e^{-(x-s)²} = e^{-x²} e^{2xs} e^{-s²}.
-  void at(long cell, double q, double& g, double& dg) const {
-    const double x = q - cell * kStep;
+  // Anywhere in [kh, (k+1)h], by ONE node set for the whole cell (definitions E5). The weights
+  // follow from two exponentials: e^{-(x-s)²} = e^{-x²} e^{2xs} e^{-s²}.
+  void at(long cell, double t, Rng&, double& g, double& dg) const {
+    const double q = line_.q(t), x = q - cell * kStep;
     const double up = std::exp(2 * kStep * x), down = 1 / up;
     double power[kNodes];
     power[7] = std::exp(-x * x);
@@ -55,9 +98,19 @@ class ConvolutionPath {
     const double moment = (w * kTable.node).sum();
     g = sum;
     dg = -2 * (x * sum - moment);
+    condition(q, g, dg);
   }
 
+  double deviation(double h) const { return deviation_ * (h * h) * (h * h); }
+  PathGradient gradient(double t, double, double dg, Rng&) const { return line_.gradient(t, dg); }
+
  private:
+  static constexpr double kStep = 0.5;  // h, also the march's natural step
+  static constexpr int kNodes = 16;     // nodes in reach of one cell [kh, (k+1)h): k-7 … k+8
+  // The cubic is off by u²(h-u)² |g''''| / 24 <= (4/3)(B₁+B₂) (h/2)⁴ |g''''| / 24, and 4.5 standard
+  // deviations of g'''' are 4.5 √105.
+  static constexpr double kDeviation = 0.16;
+
   struct Run {
     long first;
     std::size_t offset;
@@ -99,6 +152,16 @@ class ConvolutionPath {
     dg = xi.dot(weights.slope);
   }
 
+  // From here on derivatives are per t.
+  void condition(double q, double& g, double& dg) const {
+    if (conditioned_ && q <= 9) {  // exp(-q²/2) < 3e-18 beyond
+      const double k = std::exp(-0.5 * q * q), x = delta_value_ + q * delta_slope_;
+      g += k * x;
+      dg += k * (delta_slope_ - q * x);
+    }
+    dg *= line_.inverse_length();
+  }
+
   Window window(long cell) const {
     const long first = cell - 7;
     std::size_t r = runs_.size() - 1;
@@ -106,8 +169,13 @@ class ConvolutionPath {
     return Window(nodes_.data() + runs_[r].offset + (first - runs_[r].first));
   }
 
+  RadialLine line_;
+  double step_ = 1, deviation_ = 0, pull_ = 0;
+  double delta_value_ = 0, delta_slope_ = 0;
+  bool conditioned_ = false;
   std::vector<double> nodes_;
   std::vector<Run> runs_;
 };
+static_assert(LinePath<ConvolutionPath>);
 
 }  // namespace gpis

@@ -5,10 +5,11 @@
 #include <mutex>
 #include <stdexcept>
 
+#include "field/check.h"
+#include "process/march_sampler.h"
+
 namespace gpis {
 namespace {
-
-constexpr double kReaches[] = {8, 24, DensePath::kMaxReach};
 
 // Covariance of (g, g') at two points q apart, κ = exp(-q²/2): cov(g,g) = κ, cov(g, g') = -∂κ/∂q…
 Eigen::Matrix2d block(double q) {
@@ -43,15 +44,39 @@ const DensePath::Factor& DensePath::factor(double reach, Counters& counters) {
   return factors[i];
 }
 
-void DensePath::reset(double reach, Counters& counters) {
-  if (reach > kMaxReach)
-    throw std::invalid_argument(
-        "The dense sampler serves lines of up to 64 length scales inside the uncertain region, "
-        "this one has " +
-        std::to_string(reach) +
-        ": take the convolution sampler, a longer length_scale or smaller bounds.");
-  factor_ = &factor(reach, counters);
-  drawn_ = false;
+DensePath::Plan::Plan(const GaussianProcess& process, const Box3& bounds)
+    : line(single_term(process, "The dense sampler")) {
+  if (line.radial.family != Radial::Family::squared_exponential)
+    refuse("The dense sampler serves the squared exponential, not ", process.kernel->describe(),
+           ".");
+  const double diagonal = length(bounds.max - bounds.min);
+  const double lengths = diagonal / process.kernel->min_length_scale();
+  if (!(lengths <= kMaxReach))
+    refuse("The dense sampler serves bounds of up to ", kMaxReach,
+           " length scales across, these have ", lengths,
+           ": give the process smaller bounds or take the convolution sampler.");
+}
+
+void DensePath::reset(const Plan& plan, const LineGeometry& line, double anchor, double t_end,
+                      Counters& counters) {
+  line_.reset(plan.line, line, anchor);
+  step_ = kStep / line_.inverse_length();
+  factor_ = &factor(line_.q(t_end), counters);
+  conditioned_ = drawn_ = false;
+}
+
+// By Matheron's rule, as the convolution does.
+double DensePath::start(const PathStart& known, Rng& rng, Counters& counters) {
+  prepare(0, rng, counters);
+  double g, dg;
+  point(0, g, dg);
+  const double slope = known.slope_known ? known.slope : dg;
+  conditioned_ = true;
+  delta_value_ = known.value - g;
+  delta_slope_ = line_.per_length(slope - dg);
+  if (known.gradient_known) line_.remember(known.gradient);
+  pull_ = std::max(0.0, -known.value) + 0.61 * std::max(0.0, -line_.per_length(slope));
+  return slope;
 }
 
 void DensePath::prepare(long, Rng& rng, Counters& counters) {
@@ -62,15 +87,30 @@ void DensePath::prepare(long, Rng& rng, Counters& counters) {
   counters.line_normals += modes_.size();
 }
 
-void DensePath::at(long cell, double q, double& g, double& dg) const {
+void DensePath::point(long k, double& g, double& dg) const {
+  g = factor_->row(2 * k).dot(modes_);
+  dg = factor_->row(2 * k + 1).dot(modes_);
+  if (conditioned_) {
+    const double q = k * kStep, c = std::exp(-0.5 * q * q), x = delta_value_ + q * delta_slope_;
+    g += c * x;
+    dg += c * (delta_slope_ - q * x);
+  }
+  dg *= line_.inverse_length();
+}
+
+void DensePath::at(long cell, double t, Rng&, double& g, double& dg) const {
   double a, da, b, db;
   point(cell, a, da);
   point(cell + 1, b, db);
   // Bernstein form of the cubic through both ends.
-  const double s = q / kStep - cell, r = 1 - s;
-  const double c1 = a + da * kStep / 3, c2 = b - db * kStep / 3;
+  const double s = line_.q(t) / kStep - cell, r = 1 - s;
+  const double c1 = a + da * step_ / 3, c2 = b - db * step_ / 3;
   g = r * r * r * a + 3 * r * r * s * c1 + 3 * r * s * s * c2 + s * s * s * b;
-  dg = 3 * (r * r * (c1 - a) + 2 * r * s * (c2 - c1) + s * s * (b - c2)) / kStep;
+  dg = 3 * (r * r * (c1 - a) + 2 * r * s * (c2 - c1) + s * s * (b - c2)) / step_;
+}
+
+std::unique_ptr<LineSampler> make_dense(const GaussianProcess& process, const Box3& bounds) {
+  return make_sampler<DensePath>(process, bounds);
 }
 
 }  // namespace gpis

@@ -43,14 +43,14 @@ FirstHits first_hits(const ProcessSurface& surface, const FirstHitsQuery& query)
   result.t.resize(query.rays.size());
   result.state.resize(query.rays.size());
   result.counters = for_each_hit(
-      surface, query, [&](std::size_t i, const Line& line, double t, Rng& rng, Counters& counters) {
+      surface, query, [&](std::size_t i, Line& line, double t, Rng& rng, Counters& counters) {
         result.t[i] = t;
         if (std::isinf(t)) {
           result.state[i] = {nan, {nan, nan, nan}};
           return;
         }
         counters.line_normals += 2;
-        result.state[i] = surface.state(0, surface.gradient_law(line, t).draw(rng));
+        result.state[i] = surface.state(0, surface.gradient_law(line, t, rng).draw(rng));
       });
   return result;
 }
@@ -59,9 +59,9 @@ std::vector<double> line_values(const ProcessSurface& surface, const FirstHitsQu
                                 const std::vector<double>& t) {
   std::vector<double> values(query.rays.size() * t.size(),
                              std::numeric_limits<double>::quiet_NaN());
-  for_each_hit(surface, query, [&](std::size_t i, const Line& line, double, Rng&, Counters&) {
+  for_each_hit(surface, query, [&](std::size_t i, Line& line, double, Rng& rng, Counters&) {
     for (std::size_t j = 0; j < t.size(); ++j)
-      if (surface.sampled_at(line, t[j])) values[i * t.size() + j] = surface.value(line, t[j]);
+      if (surface.sampled_at(line, t[j])) values[i * t.size() + j] = surface.value(line, t[j], rng);
   });
   return values;
 }

@@ -1,40 +1,19 @@
-// One ray through one process: the sample path, what it was conditioned on, and where it ended.
+// One ray through one process: its sample path, where it was sampled, and where it ended.
 #pragma once
 
+#include <memory>
 #include <vector>
 
-#include "process/convolution_path.h"
-#include "process/dense_path.h"
+#include "process/path.h"
 #include "process/surface.h"
 
 namespace gpis {
 
-// σ = 0: the surface is the mean itself and nothing is drawn. Marches like the others.
-class ZeroPath {
- public:
-  static constexpr double kStep = 0.5;
-  void reset(double, Counters&) {}
-  void prepare(long, Rng&, Counters&) {}
-  void at_left(long, double& g, double& dg) const { g = dg = 0; }
-  void at_right(long, double& g, double& dg) const { g = dg = 0; }
-  void at(long, double, double& g, double& dg) const { g = dg = 0; }
-};
-
 struct Line::Impl {
-  // Object space. q = (t - anchor) · inverse_length is the distance from the first uncertain point
-  // in length scales.
-  Vec3 origin, direction;
-  double inverse_length = 1, anchor = 0;
-  Vec3 e1, e2, ed;  // orthonormal in whitened space, ed along the ray
+  LineGeometry geometry;  // object space
 
-  // Conditions at the anchor by Matheron's rule (math.md §5.1): g(q) += κ(q)(Δ₀ + qΔ₁).
-  double delta_value = 0, delta_slope = 0;
-  bool conditioned = false;
-  // Remembered transverse slopes γ(0) (math.md §4); without them the prior's, of correlation 0 with
-  // anything.
-  double gamma1 = 0, gamma2 = 0;
-  bool has_gamma = false;
-
+  // Where the sample path begins: the first uncertain t.
+  double anchor = 0;
   // Stretches of t on which the path was sampled, in increasing order.
   struct Stretch {
     double begin, end;
@@ -42,22 +21,33 @@ struct Line::Impl {
   };
   std::vector<Stretch> stretches;
 
-  // The hit: fields and g by the piece and cell of the arriving side.
+  // The hit: fields and g by the piece and cell of the arriving side, dg per t.
   double hit_t = kInfinity, hit_g = 0, hit_dg = 0;
   FieldSample hit_mean, hit_sigma;
 
-  ConvolutionPath convolution;
-  DensePath dense;
-  ZeroPath zero;
-
-  double q_of(double t) const { return (t - anchor) * inverse_length; }
-
-  void condition(double q, double& g, double& dg) const {
-    if (!conditioned || q > 9) return;  // exp(-q²/2) < 3e-18
-    const double k = std::exp(-0.5 * q * q), x = delta_value + q * delta_slope;
-    g += k * x;
-    dg += k * (delta_slope - q * x);
+  // The one instance of each kind of path, made when first used: a line serves objects of every
+  // kind.
+  template <class Path>
+  Path& path() {
+    const std::size_t i = kIndex<Path>;
+    if (i >= paths_.size()) paths_.resize(i + 1);
+    if (!paths_[i]) paths_[i] = std::make_unique<Slot<Path>>();
+    return static_cast<Slot<Path>&>(*paths_[i]).path;
   }
+
+ private:
+  struct AnySlot {
+    virtual ~AnySlot() = default;
+  };
+  template <class Path>
+  struct Slot : AnySlot {
+    Path path;
+  };
+  inline static std::size_t kinds_ = 0;
+  template <class Path>
+  inline static const std::size_t kIndex = kinds_++;
+
+  std::vector<std::unique_ptr<AnySlot>> paths_;
 };
 
 }  // namespace gpis

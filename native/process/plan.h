@@ -5,27 +5,21 @@
 #include <memory>
 #include <string>
 
-#include "process/surface.h"
+#include "process/line_sampler.h"
 
 namespace gpis {
 
 struct PlannedLine {
-  std::shared_ptr<const GaussianProcess> process;
-  double sigma_max = 0;  // over all space
+  std::shared_ptr<const GaussianProcess> process;  // with a kernel of unit variance
+  double sigma_max = 0;                            // over all space
   double skip_threshold =
       0;  // where the mean exceeds it, the surface is certainly absent (definitions B13)
   double skip_deviations = 0;  // the same in standard deviations
   double smooth_scale = kInfinity;
   double mean_lipschitz = kInfinity, sigma_lipschitz = kInfinity;
-  Box3 bounds;                             // object space; outside there is no surface
-  Mat3 whitening, unwhitening;             // B with A⁻¹ = BᵀB, and B⁻ᵀ
-  Sampler sampler = Sampler::convolution;  // resolved, never automatic
+  Box3 bounds;  // object space; outside there is no surface
+  std::unique_ptr<const LineSampler> line_sampler;
   std::string sampler_reason;
-
-  // March of the chosen combination of mean, deviation and sampler.
-  using March = double (*)(const PlannedLine&, Line::Impl&, double t_begin, double t_end,
-                           const Start&, Rng&, Counters&);
-  March march = nullptr;
 };
 
 // Throws std::invalid_argument with a sentence where the process cannot be rendered.

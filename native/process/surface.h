@@ -73,7 +73,6 @@ class ProcessSurface {
                  Memory memory, Sampler sampler, double missed_root);
 
   Memory memory() const { return memory_; }
-  const GaussianProcess& process() const { return *process_; }
   // World-space box outside of which there is certainly no surface (infinite where unbounded).
   const Box3& bounds() const { return world_bounds_; }
 
@@ -86,10 +85,10 @@ class ProcessSurface {
   // remembered, B1/B5).
   bool sampled_at(const Line& line, double t) const;
   // Law of the world gradient at t given the sample path. Only where sampled_at(line, t) or t is
-  // the hit.
-  GradientLaw gradient_law(const Line& line, double t) const;
+  // the hit. A path may have to draw what it holds between the points that were met.
+  GradientLaw gradient_law(Line& line, double t, Rng& rng) const;
   // f at t on the sample path (0 at the hit).
-  double value(const Line& line, double t) const;
+  double value(Line& line, double t, Rng& rng) const;
 
   // A world gradient, drawn from gradient_law or chosen by light sampling, as the state to remember
   // (object space).
@@ -104,7 +103,6 @@ class ProcessSurface {
   std::vector<std::pair<std::string, std::string>> plan() const;
 
  private:
-  std::shared_ptr<const GaussianProcess> process_;
   Affine object_to_world_, world_to_object_;
   Memory memory_;
   Box3 world_bounds_;

@@ -1,0 +1,31 @@
+// A line sampler with all that was decided once per object: kinds of mean, deviation and path.
+#pragma once
+
+#include <memory>
+
+#include "process/line_impl.h"
+
+namespace gpis {
+
+struct PlannedLine;
+
+class LineSampler {
+ public:
+  virtual ~LineSampler() = default;
+  // Draws a new path and marches it: fills line.hit_* and returns the hit's t, or infinity.
+  virtual double first_hit(const PlannedLine& plan, Line::Impl& line, double t_begin, double t_end,
+                           const Start& start, Rng& rng, Counters& counters) const = 0;
+  // On that path: g and its slope per t, where it was sampled.
+  virtual void path_at(Line::Impl& line, double t, Rng& rng, double& g, double& dg) const = 0;
+  virtual PathGradient gradient(Line::Impl& line, double t, double g, double dg,
+                                Rng& rng) const = 0;
+  // Bound on |implied - exact correlation| of the path.
+  virtual double correlation_error() const = 0;
+};
+
+// One per path, in its own file. They throw a sentence where the path cannot serve the process.
+std::unique_ptr<LineSampler> make_zero(const GaussianProcess& process, const Box3& bounds);
+std::unique_ptr<LineSampler> make_convolution(const GaussianProcess& process, const Box3& bounds);
+std::unique_ptr<LineSampler> make_dense(const GaussianProcess& process, const Box3& bounds);
+
+}  // namespace gpis
