@@ -1,7 +1,7 @@
 #include "binding/bind_film.h"
 
 #include "binding/reader.h"
-#include "render/pixel_points.h"
+#include "core/block_points.h"
 
 namespace gpis {
 

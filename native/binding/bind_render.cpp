@@ -8,7 +8,7 @@
 #include "binding/bindings.h"
 #include "binding/reader.h"
 #include "binding/result_file.h"
-#include "render/pixel_points.h"
+#include "core/block_points.h"
 #include "render/session.h"
 #include "scene/scene.h"
 

@@ -5,6 +5,11 @@
 
 namespace gpis {
 
+// A point of the unit square: the two numbers of one random decision.
+struct SquarePoint {
+  double u, v;
+};
+
 // Uniform on the unit disk, with little distortion (Shirley & Chiu 1997).
 inline std::pair<double, double> square_to_disk(double u1, double u2) {
   const double a = 2 * u1 - 1, b = 2 * u2 - 1;
@@ -12,6 +17,12 @@ inline std::pair<double, double> square_to_disk(double u1, double u2) {
   const bool wide = std::abs(a) > std::abs(b);
   const double r = wide ? a : b;
   const double phi = wide ? kPi / 4 * (b / a) : kPi / 2 - kPi / 4 * (a / b);
+  return {r * std::cos(phi), r * std::sin(phi)};
+}
+
+// Two independent standard normal numbers (Box & Muller 1958).
+inline std::pair<double, double> square_to_normals(SquarePoint at) {
+  const double r = std::sqrt(-2 * std::log1p(-at.u)), phi = 2 * kPi * at.v;
   return {r * std::cos(phi), r * std::sin(phi)};
 }
 

@@ -12,6 +12,10 @@ constexpr int kPathLengthLimit = 100'000;
 // Russian roulette starts here; before, nearly every path still matters.
 constexpr int kRouletteStart = 3;
 
+// The decisions of one vertex that low-discrepancy points make, in their order.
+constexpr int kGradientDecision = 0, kDirectionDecision = 1, kLightDecision = 2;
+constexpr int kVertexDecisions = kLightDecision + LightSet::kMostGroups;
+
 // What a path knows of each stochastic surface at the point it leaves; nothing: a fresh start
 // outside of it.
 using PathMemory = std::vector<std::optional<State>>;
@@ -44,6 +48,10 @@ struct PathTracer::Impl {
     if (!law.degenerate) counters->line_normals += 2;
     return law.draw(*rng);
   }
+  // The sample's point for a decision of the vertex in hand.
+  SquarePoint point(int decision, Rng& source) const {
+    return points->point(kPixelDecision + 1 + bounce * kVertexDecisions + decision, source);
+  }
   bool visible(const Ray& ray, double distance);
   template <class Scatter, class Remember>
   Color sample_lights(const Vertex& v, const Scatter& scatter, const Remember& remember);
@@ -58,6 +66,8 @@ struct PathTracer::Impl {
   std::vector<char> met;
   Line shadow_line;
   PathMemory memory, shadow_memory;
+  const BlockPoints* points = nullptr;
+  int bounce = 0;
   Rng* rng = nullptr;
   Rng light_rng{0, 0};  // its own stream: light sampling never changes the path
   Counters* counters = nullptr;
@@ -66,7 +76,9 @@ struct PathTracer::Impl {
 PathTracer::PathTracer(const Scene& scene) : impl_(std::make_unique<Impl>(scene)) {}
 PathTracer::~PathTracer() = default;
 
-PathSample PathTracer::trace(const Ray& camera_ray, double t_max, Rng& rng, Counters& counters) {
+PathSample PathTracer::trace(const Ray& camera_ray, double t_max, const BlockPoints& points,
+                             Rng& rng, Counters& counters) {
+  impl_->points = &points;
   impl_->rng = &rng;
   impl_->light_rng = Rng(rng(), 0);
   impl_->counters = &counters;
@@ -81,7 +93,7 @@ PathSample PathTracer::Impl::trace(const Ray& camera_ray, double t_max) {
   double scatter_pdf = kInfinity;
   for (auto& state : memory) state.reset();
 
-  for (int bounce = 0;; ++bounce) {
+  for (bounce = 0;; ++bounce) {
     Vertex v;
     const bool hit = closest(ray, bounce == 0 ? t_max : kInfinity, v);
 
@@ -203,16 +215,21 @@ bool PathTracer::Impl::visible(const Ray& ray, double distance) {
 template <class Scatter, class Remember>
 Color PathTracer::Impl::sample_lights(const Vertex& v, const Scatter& scatter,
                                       const Remember& remember) {
-  if (!scene.lights.sampled()) return {};
-  const std::optional<LightSample> light = scene.lights.sample(v.departure, light_rng);
-  if (!light) return {};
-  const Color f = scatter.eval(light->direction);
-  if (!(max_component(f) > 0)) return {};
-  shadow_memory = memory;
-  remember(light->direction, shadow_memory);
-  if (!visible({v.departure, light->direction}, light->distance)) return {};
-  if (light->delta()) return f * light->radiance;
-  return f * light->radiance * (balance(light->pdf, scatter.pdf(light->direction)) / light->pdf);
+  Color sum;
+  for (int group = 0; group < scene.lights.groups(); ++group) {
+    const SquarePoint at = point(kLightDecision + group, light_rng);
+    const std::optional<LightSample> light = scene.lights.sample(group, v.departure, at);
+    if (!light) continue;
+    const Color f = scatter.eval(light->direction);
+    if (!(max_component(f) > 0)) continue;
+    shadow_memory = memory;
+    remember(light->direction, shadow_memory);
+    if (!visible({v.departure, light->direction}, light->distance)) continue;
+    const double weight =
+        light->delta() ? 1 : balance(light->pdf, scatter.pdf(light->direction)) / light->pdf;
+    sum += f * light->radiance * weight;
+  }
+  return sum;
 }
 
 // Light from sampled lights, and the direction in which the path goes on (nothing: absorbed). On a
@@ -223,12 +240,17 @@ std::optional<ScatterSample> PathTracer::Impl::scatter_at(const Ray& ray, const 
     const SurfaceScatter scatter(*v.material, ray.direction, v.geometric_normal, v.shading_normal);
     normal = v.shading_normal;
     if (!scatter.specular()) direct = sample_lights(v, scatter, [](const Vec3&, PathMemory&) {});
-    return scatter.sample(*rng);
+    return scatter.sample(point(kDirectionDecision, *rng));
   }
 
   const ProcessSurface& surface = scene.stochastic[v.surface].surface;
   const GradientLaw law = surface.gradient_law(lines[v.surface], v.t, *rng);
-  const Vec3 gradient = draw(law);
+  Vec3 gradient = law.mean;
+  if (!law.degenerate) {
+    const auto [xi1, xi2] = square_to_normals(point(kGradientDecision, *rng));
+    gradient += law.b1 * xi1 + law.b2 * xi2;
+    counters->line_normals += 2;
+  }
   memory[v.surface] = surface.state(0, gradient);
   normal = normalize(gradient);
   if (v.material->specular() && !law.degenerate) {
@@ -240,7 +262,7 @@ std::optional<ScatterSample> PathTracer::Impl::scatter_at(const Ray& ray, const 
   }
   const SurfaceScatter scatter(*v.material, ray.direction, normal, normal);
   if (!scatter.specular()) direct = sample_lights(v, scatter, [](const Vec3&, PathMemory&) {});
-  return scatter.sample(*rng);
+  return scatter.sample(point(kDirectionDecision, *rng));
 }
 
 }  // namespace gpis

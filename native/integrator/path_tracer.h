@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "core/block_points.h"
 #include "core/counters.h"
 #include "core/rng.h"
 #include "core/vec.h"
@@ -11,6 +12,9 @@
 namespace gpis {
 
 class Scene;
+
+// Which of the sample's points places it in its pixel.
+inline constexpr int kPixelDecision = 0;
 
 // One camera sample: radiance and first-hit features. Unset features stay zero, depth infinite.
 // Depth is the distance along the camera ray to its first hit; the camera's `clip` reaches the
@@ -28,7 +32,9 @@ class PathTracer {
  public:
   explicit PathTracer(const Scene& scene);
   ~PathTracer();
-  PathSample trace(const Ray& camera_ray, double t_max, Rng& rng, Counters& counters);
+  // `points`: those of the sample; the tracer leaves the set kPixelDecision to the camera.
+  PathSample trace(const Ray& camera_ray, double t_max, const BlockPoints& points, Rng& rng,
+                   Counters& counters);
 
  private:
   struct Impl;

@@ -4,8 +4,8 @@
 
 #include <optional>
 
-#include "core/rng.h"
 #include "core/vec.h"
+#include "core/warp.h"
 #include "material/material.h"
 #include "process/surface.h"
 
@@ -48,8 +48,8 @@ class SurfaceScatter {
     if (bent_) p += material_.pdf(wo_, frame_.to_local(flipped(w)));
     return p;
   }
-  std::optional<ScatterSample> sample(Rng& rng) const {
-    const std::optional<MaterialSample> s = material_.sample(wo_, rng);
+  std::optional<ScatterSample> sample(SquarePoint at) const {
+    const std::optional<MaterialSample> s = material_.sample(wo_, at);
     if (!s) return std::nullopt;
     const Vec3 w = frame_.to_world(s->wi);
     if (!bent_) return ScatterSample{w, s->weight, s->specular ? kInfinity : s->pdf};

@@ -29,11 +29,10 @@ class AreaLight final : public Light {
   }
 
   double power(double) const override { return luminance(radiance_) * kPi * area_; }
-  std::optional<LightSample> sample(const Vec3& point, Rng& rng) const override {
-    const double u1 = rng.uniform(), u2 = rng.uniform();
-    double a = u1 - 0.5, b = u2 - 0.5;
+  std::optional<LightSample> sample(const Vec3& point, SquarePoint at) const override {
+    double a = at.u - 0.5, b = at.v - 0.5;
     if (ellipse_) {
-      const auto [x, y] = square_to_disk(u1, u2);
+      const auto [x, y] = square_to_disk(at.u, at.v);
       a = x / 2;
       b = y / 2;
     }

@@ -18,7 +18,9 @@ class ConstantEnvironment final : public Light {
   explicit ConstantEnvironment(const Color& radiance) : radiance_(radiance) {}
 
   double power(double) const override { return 0; }
-  std::optional<LightSample> sample(const Vec3&, Rng&) const override { return std::nullopt; }
+  std::optional<LightSample> sample(const Vec3&, SquarePoint) const override {
+    return std::nullopt;
+  }
   std::optional<LightHit> intersect(const Ray&, double t_max) const override {
     if (t_max < kInfinity) return std::nullopt;
     return LightHit{radiance_, 0};
@@ -55,11 +57,11 @@ class ImageEnvironment final : public Light {
   }
 
   double power(double r) const override { return mean_ * 4 * kPi * kPi * r * r; }
-  std::optional<LightSample> sample(const Vec3&, Rng& rng) const override {
-    const auto [i, j] = patches_->sample(rng.uniform(), rng.uniform());
-    const double phi = 2 * kPi * (0.5 - (i + 0.5 + rng.uniform()) / width_);
+  std::optional<LightSample> sample(const Vec3&, SquarePoint at) const override {
+    const auto [i, j] = patches_->sample(at);
+    const double phi = 2 * kPi * (0.5 - (i + 0.5 + at.u) / width_);
     const double low = sin_latitude(j), high = sin_latitude(j + 1);
-    const double z = low + (high - low) * rng.uniform(), r = std::sqrt(std::max(0.0, 1 - z * z));
+    const double z = low + (high - low) * at.v, r = std::sqrt(std::max(0.0, 1 - z * z));
     const Vec3 local{r * std::cos(phi), r * std::sin(phi), z};
     return LightSample{to_world_ * local, kInfinity, look_up(local).first, density(i, j)};
   }

@@ -7,8 +7,8 @@
 #include <optional>
 #include <vector>
 
-#include "core/rng.h"
 #include "core/vec.h"
+#include "core/warp.h"
 
 namespace gpis {
 
@@ -31,8 +31,9 @@ class Light {
   virtual ~Light() = default;
   // Emitted power in watts (its luminance); of distant lights what enters a sphere of that radius.
   virtual double power(double scene_radius) const = 0;
-  // Nothing if the point is where the light does not shine.
-  virtual std::optional<LightSample> sample(const Vec3& point, Rng& rng) const = 0;
+  // `at` chooses the place on the light, area by area. Nothing if the point is where the light does
+  // not shine.
+  virtual std::optional<LightSample> sample(const Vec3& point, SquarePoint at) const = 0;
   // What the ray meets of the light before t_max; distant lights are met at infinity only. Delta
   // lights are never met.
   virtual std::optional<LightHit> intersect(const Ray& ray, double t_max) const = 0;

@@ -27,7 +27,7 @@ class PointLight final : public Light {
       : position_(position), power_(power), cone_(cone) {}
 
   double power(double) const override { return luminance(power_); }
-  std::optional<LightSample> sample(const Vec3& point, Rng&) const override {
+  std::optional<LightSample> sample(const Vec3& point, SquarePoint) const override {
     const Vec3 to_light = position_ - point;
     const double distance2 = dot(to_light, to_light);
     if (distance2 == 0) return std::nullopt;
@@ -54,13 +54,12 @@ class SphereLight final : public Light {
   }
 
   double power(double) const override { return luminance(power_); }
-  std::optional<LightSample> sample(const Vec3& point, Rng& rng) const override {
+  std::optional<LightSample> sample(const Vec3& point, SquarePoint at) const override {
     const Vec3 to_center = position_ - point;
     const double distance2 = dot(to_center, to_center), cap = cap_from(distance2);
     if (cap == 0) return std::nullopt;
-    const double u1 = rng.uniform(), u2 = rng.uniform();
     const Vec3 direction =
-        Frame(to_center / std::sqrt(distance2)).to_world(square_to_cone(u1, u2, cap));
+        Frame(to_center / std::sqrt(distance2)).to_world(square_to_cone(at.u, at.v, cap));
     const double attenuation = cone_.attenuation(-direction);
     if (attenuation == 0) return std::nullopt;
     const double along = dot(to_center, direction);

@@ -12,7 +12,7 @@ class DirectionalSun final : public Light {
       : to_sun_(-axis), irradiance_(irradiance) {}
 
   double power(double r) const override { return luminance(irradiance_) * kPi * r * r; }
-  std::optional<LightSample> sample(const Vec3&, Rng&) const override {
+  std::optional<LightSample> sample(const Vec3&, SquarePoint) const override {
     return LightSample{to_sun_, kInfinity, irradiance_, kInfinity};
   }
   std::optional<LightHit> intersect(const Ray&, double) const override { return std::nullopt; }
@@ -32,9 +32,8 @@ class DiskSun final : public Light {
   }
 
   double power(double r) const override { return luminance(irradiance_) * kPi * r * r; }
-  std::optional<LightSample> sample(const Vec3&, Rng& rng) const override {
-    const double u1 = rng.uniform(), u2 = rng.uniform();
-    return LightSample{frame_.to_world(square_to_cone(u1, u2, cap_)), kInfinity, radiance_,
+  std::optional<LightSample> sample(const Vec3&, SquarePoint at) const override {
+    return LightSample{frame_.to_world(square_to_cone(at.u, at.v, cap_)), kInfinity, radiance_,
                        density()};
   }
   std::optional<LightHit> intersect(const Ray& ray, double t_max) const override {

@@ -13,8 +13,8 @@ class Conductor final : public Material {
     return color_ * ggx_.reflect_eval(wo, wi);
   }
   double pdf(const Vec3& wo, const Vec3& wi) const override { return ggx_.reflect_pdf(wo, wi); }
-  std::optional<MaterialSample> sample(const Vec3& wo, Rng& rng) const override {
-    const Vec3 wi = reflect(wo, ggx_.sample_visible(wo, rng));
+  std::optional<MaterialSample> sample(const Vec3& wo, SquarePoint at) const override {
+    const Vec3 wi = reflect(wo, ggx_.sample_visible(wo, at));
     if (wi.z <= 0) return std::nullopt;
     return MaterialSample{wi, color_ * ggx_.reflect_weight(wo, wi), ggx_.reflect_pdf(wo, wi)};
   }

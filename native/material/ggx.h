@@ -2,8 +2,8 @@
 // et al. 2007, Heitz 2014). α = roughness², as in Blender. Local frame, macro normal +z.
 #pragma once
 
-#include "core/rng.h"
 #include "core/vec.h"
+#include "core/warp.h"
 
 namespace gpis {
 
@@ -23,10 +23,10 @@ class Ggx {
   }
   // Visible normals: density masking(wo) (wo·h)₊ D(h) / wo.z (Dupuy & Benyoub 2023, spherical
   // caps).
-  Vec3 sample_visible(const Vec3& wo, Rng& rng) const {
+  Vec3 sample_visible(const Vec3& wo, SquarePoint at) const {
     const Vec3 v = normalize({alpha_ * wo.x, alpha_ * wo.y, wo.z});
-    const double phi = 2 * kPi * rng.uniform();
-    const double z = 1 - rng.uniform() * (1 + v.z);
+    const double phi = 2 * kPi * at.v;
+    const double z = 1 - at.u * (1 + v.z);
     const double sin = std::sqrt(std::max(0.0, 1 - z * z));
     const Vec3 h = Vec3{sin * std::cos(phi), sin * std::sin(phi), z} + v;
     return normalize({alpha_ * h.x, alpha_ * h.y, h.z});

@@ -11,9 +11,8 @@ class Lambert final : public Material {
 
   Color eval(const Vec3& wo, const Vec3& wi) const override { return color_ * pdf(wo, wi); }
   double pdf(const Vec3&, const Vec3& wi) const override { return std::max(0.0, wi.z) / kPi; }
-  std::optional<MaterialSample> sample(const Vec3& wo, Rng& rng) const override {
-    const double u1 = rng.uniform(), u2 = rng.uniform();
-    const Vec3 wi = square_to_cosine_hemisphere(u1, u2);
+  std::optional<MaterialSample> sample(const Vec3& wo, SquarePoint at) const override {
+    const Vec3 wi = square_to_cosine_hemisphere(at.u, at.v);
     return MaterialSample{wi, color_, pdf(wo, wi)};
   }
   Color albedo() const override { return color_; }

@@ -6,8 +6,8 @@
 #include <memory>
 #include <optional>
 
-#include "core/rng.h"
 #include "core/vec.h"
+#include "core/warp.h"
 
 namespace gpis {
 
@@ -25,7 +25,7 @@ class Material {
   virtual Color eval(const Vec3& wo, const Vec3& wi) const = 0;
   virtual double pdf(const Vec3& wo, const Vec3& wi) const = 0;
   // Nothing where the light is absorbed (the loss of single scattering on rough metals).
-  virtual std::optional<MaterialSample> sample(const Vec3& wo, Rng& rng) const = 0;
+  virtual std::optional<MaterialSample> sample(const Vec3& wo, SquarePoint at) const = 0;
   // What the albedo pass shows.
   virtual Color albedo() const = 0;
   // True if all light goes in one direction: eval and pdf are zero, and this much is reflected at

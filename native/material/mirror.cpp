@@ -12,7 +12,7 @@ class Mirror final : public Material {
 
   Color eval(const Vec3&, const Vec3&) const override { return {}; }
   double pdf(const Vec3&, const Vec3&) const override { return 0; }
-  std::optional<MaterialSample> sample(const Vec3& wo, Rng&) const override {
+  std::optional<MaterialSample> sample(const Vec3& wo, SquarePoint) const override {
     return MaterialSample{{-wo.x, -wo.y, wo.z}, specular_reflectance(wo.z), 0, true};
   }
   Color albedo() const override { return color_; }

@@ -36,14 +36,15 @@ class Principled final : public Material {
     const double p = facet_probability(wo);
     return p * ggx_.reflect_pdf(wo, wi) + (1 - p) * wi.z / kPi;
   }
-  std::optional<MaterialSample> sample(const Vec3& wo, Rng& rng) const override {
+  std::optional<MaterialSample> sample(const Vec3& wo, SquarePoint at) const override {
     Vec3 wi;
-    if (rng.uniform() < facet_probability(wo)) {
-      wi = reflect(wo, ggx_.sample_visible(wo, rng));
+    // One number chooses the lobe and, stretched again, the direction in it.
+    const double p = facet_probability(wo);
+    if (at.u < p) {
+      wi = reflect(wo, ggx_.sample_visible(wo, {at.u / p, at.v}));
       if (wi.z <= 0) return std::nullopt;
     } else {
-      const double u1 = rng.uniform(), u2 = rng.uniform();
-      wi = square_to_cosine_hemisphere(u1, u2);
+      wi = square_to_cosine_hemisphere((at.u - p) / (1 - p), at.v);
     }
     const double density = pdf(wo, wi);
     return MaterialSample{wi, eval(wo, wi) / density, density};

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "render/pixel_points.h"
+#include "core/block_points.h"
 
 namespace gpis {
 

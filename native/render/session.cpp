@@ -11,9 +11,9 @@
 #include <thread>
 #include <tuple>
 
+#include "core/block_points.h"
 #include "integrator/path_tracer.h"
 #include "render/filter.h"
-#include "render/pixel_points.h"
 #include "scene/camera.h"
 #include "scene/scene.h"
 
@@ -226,10 +226,11 @@ class Session {
     const std::uint64_t pixel = static_cast<std::uint64_t>(y) * options_.width + x;
     const std::uint64_t scramble = block_scramble(options_.seed, pixel, sample / kBlockSamples);
     Rng rng(options_.seed, pixel, sample);
-    const PixelPoint point = pixel_point(scramble, sample % kBlockSamples, rng);
+    const BlockPoints points(scramble, sample % kBlockSamples);
+    const SquarePoint point = points.point(kPixelDecision, rng);
     const CameraRay ray =
         camera_.ray(x + 0.5 + filter_.offset(point.u), y + 0.5 + filter_.offset(point.v));
-    const PathSample path = tracer.trace(ray.ray, ray.t_max, rng, worker.counters);
+    const PathSample path = tracer.trace(ray.ray, ray.t_max, points, rng, worker.counters);
 
     FilmSample film_sample{path.radiance, path.alpha, ray.depth(path.depth), path.normal,
                            path.albedo};

@@ -125,8 +125,9 @@ std::vector<std::pair<std::string, std::string>> Scene::plan() const {
                         : "left out: no meshes");
   rows.emplace_back(
       "scene.light_sampling",
-      impl_->lights.sampled()
-          ? "on: a shadow ray at every surface that is not a deterministic mirror"
+      impl_->lights.groups() > 0
+          ? "on: " + std::to_string(impl_->lights.groups()) +
+                " shadow rays at every surface that is not a deterministic mirror"
       : d.settings.light_sampling
           ? "left out: nothing to sample (a constant world is met by following the BRDF)"
           : "off by settings.light_sampling");

@@ -6,6 +6,9 @@
 #include <iostream>
 #include <vector>
 
+#include "core/rng.h"
+#include "core/warp.h"
+
 namespace gpis::test {
 
 struct Case {
@@ -54,6 +57,11 @@ struct Mean {
     return (mean() - o.mean()) / std::hypot(error(), o.error(), 1e-9 * std::max(1.0, mean()));
   }
 };
+
+inline SquarePoint square_point(Rng& rng) {
+  const double u = rng.uniform();
+  return {u, rng.uniform()};
+}
 
 }  // namespace gpis::test
 

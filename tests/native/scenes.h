@@ -111,6 +111,11 @@ inline void add_process(SceneDescription& scene, std::shared_ptr<const GaussianP
   scene.objects.push_back(o);
 }
 
+// Those of one sample alone: independent of all others.
+inline BlockPoints any_points(Rng& rng) {
+  return {rng(), 0};
+}
+
 struct Render {
   Mean radiance;
   Counters counters;
@@ -126,7 +131,8 @@ Render trace(const SceneDescription& description, const MakeRay& ray, int paths,
   for (int i = 0; i < paths; ++i) {
     Rng rng(seed, i);
     const Ray r = ray(rng);
-    result.radiance.add(tracer.trace(r, kInfinity, rng, result.counters).radiance.x);
+    result.radiance.add(
+        tracer.trace(r, kInfinity, any_points(rng), rng, result.counters).radiance.x);
   }
   return result;
 }

@@ -71,7 +71,7 @@ TEST(light_irradiance_is_that_of_the_closed_form) {
     Rng rng(1, 0);
     Mean e;
     for (int n = 0; n < 100'000; ++n) {
-      const auto s = l.light->sample({}, rng);
+      const auto s = l.light->sample({}, square_point(rng));
       if (!s) {
         e.add(0);
         continue;
@@ -90,7 +90,7 @@ TEST(light_samples_meet_the_light) {
     Rng rng(2, 0);
     int missed = 0;
     for (int n = 0; n < 10'000; ++n) {
-      const auto s = l.light->sample({0.3, 0.1, 0}, rng);
+      const auto s = l.light->sample({0.3, 0.1, 0}, square_point(rng));
       if (!s) continue;
       const bool distant = s->distance == kInfinity;
       const auto hit = l.light->intersect({{0.3, 0.1, 0}, s->direction},
@@ -125,7 +125,7 @@ TEST(light_samplers_follow_their_density) {
   for (const Named& l : list) {
     context() = l.name;
     const auto sample = [&](Rng& rng) -> std::optional<Vec3> {
-      const auto s = l.light->sample({}, rng);
+      const auto s = l.light->sample({}, square_point(rng));
       if (!s) return std::nullopt;
       return s->direction;
     };
@@ -142,10 +142,10 @@ TEST(light_samplers_follow_their_density) {
 TEST(lights_shine_on_one_side) {
   const auto area = make_area({0, 0, 2}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, false, {1, 1, 1});
   Rng rng(1, 0);
-  CHECK(area->sample({}, rng).has_value(), ==, false);
+  CHECK(area->sample({}, square_point(rng)).has_value(), ==, false);
   CHECK(area->intersect({{}, {0, 0, 1}}, kInfinity).has_value(), ==, false);
   const auto sphere = make_point({}, {1, 1, 1}, 1);
-  CHECK(sphere->sample({0.1, 0, 0}, rng).has_value(), ==, false);
+  CHECK(sphere->sample({0.1, 0, 0}, square_point(rng)).has_value(), ==, false);
   CHECK(sphere->intersect({{0.1, 0, 0}, {0, 0, 1}}, kInfinity).has_value(), ==, false);
 }
 
@@ -170,23 +170,49 @@ TEST(image_lies_as_in_blender) {
   CHECK(world->intersect({{}, {0, 0, -1}}, 10).has_value(), ==, false);
 }
 
-TEST(light_set_keeps_choice_in_the_density) {
+namespace {
+
+// A point over a lamp, a sun and a world, and as many weak lamps as are wanted.
+LightSet some_lights(int weak) {
   LightSet set;
   set.add(make_point({0, 0, 2}, {10, 0, 0}, 0), false);
   set.add(make_sun({0, 0, -1}, {3, 0, 0}, 0.2), false);
   set.add(make_constant_environment({7, 0, 0}), true);
-  set.finish(5, true);
-  CHECK(std::abs(set.probability(0) + set.probability(1) - 1), <, 1e-12);
-  CHECK(set.probability(0), >, 0.25);
-  CHECK(set.probability(2), ==, 0.0);  // a constant world is not sampled
-  Rng rng(3, 0);
-  Mean e;
-  for (int n = 0; n < 100'000; ++n) {
-    const auto s = set.sample({}, rng);
-    e.add(s->radiance.x * s->direction.z / (s->delta() ? 1 : s->pdf));
+  for (int i = 0; i < weak; ++i) set.add(make_point({0, 0, 1.0 + i}, {1, 0, 0}, 0.1 * i), false);
+  return set;
+}
+
+}  // namespace
+
+TEST(light_set_keeps_choice_in_the_density) {
+  for (const int weak : {0, 1, 2, 5}) {
+    context() = std::to_string(weak) + " weak lamps";
+    LightSet set = some_lights(weak);
+    set.finish(5, true);
+    // The strongest are sampled always, the others share a group.
+    CHECK(set.groups(), ==, std::min(2 + weak, LightSet::kMostGroups));
+    double sum = 0, expected = 10 / (16 * kPi) + 3;
+    for (int i = 0; i < 3 + weak; ++i) sum += set.probability(i);
+    for (int i = 0; i < weak; ++i) expected += 1 / (4 * kPi * (1 + i) * (1 + i));
+    CHECK(std::abs(sum - set.groups()), <, 1e-12);
+    CHECK(set.probability(0), ==, 1.0);
+    CHECK(set.probability(2), ==, 0.0);  // a constant world is not sampled
+    Rng rng(3, 0);
+    Mean e;
+    for (int n = 0; n < 100'000; ++n) {
+      double irradiance = 0;
+      for (int group = 0; group < set.groups(); ++group) {
+        const auto s = set.sample(group, {}, square_point(rng));
+        irradiance += s->radiance.x * s->direction.z / (s->delta() ? 1 : s->pdf);
+      }
+      e.add(irradiance);
+    }
+    CHECK(std::abs(e.z(expected)), <, 4.0);
+    CHECK(set.met_by_camera({{}, {0, 0, 1}}, 0.5).x, ==, 0.0);
+    set.finish(5, false);
+    CHECK(set.groups(), ==, 0);
   }
-  CHECK(std::abs(e.z(10 / (16 * kPi) + 3)), <, 4.0);
+  LightSet set = some_lights(0);
+  set.finish(5, true);
   CHECK(set.met_by_camera({{}, {0, 0, 1}}, kInfinity).x, ==, 7.0);
-  set.finish(5, false);
-  CHECK(set.sampled(), ==, false);
 }

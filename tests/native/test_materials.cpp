@@ -44,7 +44,7 @@ TEST(material_samplers_follow_their_density) {
     for (const Vec3& wo : directions()) {
       context() = m.name + " at cos " + std::to_string(wo.z);
       const auto sample = [&](Rng& rng) -> std::optional<Vec3> {
-        const auto s = m.material->sample(wo, rng);
+        const auto s = m.material->sample(wo, square_point(rng));
         if (!s) return std::nullopt;
         return s->wi;
       };
@@ -61,7 +61,7 @@ TEST(material_samples_carry_eval_over_pdf) {
       context() = m.name;
       Rng rng(1, 2);
       for (int n = 0; n < 1000; ++n) {
-        const auto s = m.material->sample(wo, rng);
+        const auto s = m.material->sample(wo, square_point(rng));
         if (!s) continue;
         CHECK(std::abs(s->pdf - m.material->pdf(wo, s->wi)), <=, 1e-9 * s->pdf);
         const Color f = m.material->eval(wo, s->wi);
@@ -91,7 +91,7 @@ TEST(materials_keep_energy) {
       Rng rng(7, 0);
       Mean albedo;
       for (int n = 0; n < 40'000; ++n) {
-        const auto s = m.material->sample(wo, rng);
+        const auto s = m.material->sample(wo, square_point(rng));
         albedo.add(s ? s->weight.x : 0);
       }
       CHECK(albedo.mean(), <, 1 + 4 * albedo.error() + (m.name[0] == 'p' ? 0.02 : 1e-9));
@@ -105,7 +105,7 @@ TEST(smooth_conductor_is_a_mirror) {
   CHECK(make_conductor({1, 1, 1}, 0)->specular(), ==, true);
   CHECK(make_conductor({1, 1, 1}, 0.1)->specular(), ==, false);
   const Vec3 wo = directions()[1];
-  const auto s = make_mirror({0.5, 0.5, 0.5}, {1, 1, 1})->sample(wo, rng);
+  const auto s = make_mirror({0.5, 0.5, 0.5}, {1, 1, 1})->sample(wo, square_point(rng));
   CHECK(s->wi.x, ==, -wo.x);
   CHECK(s->wi.z, ==, wo.z);
   CHECK(std::abs(s->weight.x - (0.5 + 0.5 * std::pow(1 - wo.z, 5))), <, 1e-12);

@@ -183,11 +183,12 @@ TEST(first_hit_features_are_those_of_the_surface) {
   PathTracer tracer(scene);
   Counters counters;
   Rng rng(1, 0);
-  const PathSample hit = tracer.trace({{0, 0, 3}, {0, 0, -1}}, kInfinity, rng, counters);
+  const PathSample hit =
+      tracer.trace({{0, 0, 3}, {0, 0, -1}}, kInfinity, any_points(rng), rng, counters);
   CHECK(std::abs(hit.depth - 2), <, 1e-6);
   CHECK(hit.normal.z, ==, 1.0);
   CHECK(hit.albedo.x, ==, 0.5);
-  CHECK(tracer.trace({{0, 0, 3}, {0, 0, -1}}, 1.5, rng, counters).depth, ==,
+  CHECK(tracer.trace({{0, 0, 3}, {0, 0, -1}}, 1.5, any_points(rng), rng, counters).depth, ==,
         kInfinity);  // beyond the camera's far end
 }
 
@@ -211,7 +212,7 @@ TEST(triangles_find_their_material_and_normals) {
   Counters counters;
   const auto seen = [&](double x, double y) {
     Rng rng(1, 0);
-    return tracer.trace({{x, y, 5}, {0, 0, -1}}, kInfinity, rng, counters);
+    return tracer.trace({{x, y, 5}, {0, 0, -1}}, kInfinity, any_points(rng), rng, counters);
   };
   CHECK(seen(0.5, -0.5).albedo.x, ==, 0.1);
   CHECK(seen(-0.5, 0.5).albedo.x, ==, 0.2);

@@ -145,9 +145,9 @@ def test_an_exact_scene_has_no_error(empty_scene):
 
 
 def test_noise_threshold_ends_the_render(noisy):
-    result = gn.render(noisy, 16, 12, noise_threshold=0.03)
+    result = gn.render(noisy, 16, 12, noise_threshold=0.009)
     assert result.stats["stopped_by"] == "noise" and result.stats["samples"] > 64
-    assert np.sqrt(result.stats["estimated_error"]) <= 0.03 < np.sqrt(result.history[-2]["estimated_error"])
+    assert np.sqrt(result.stats["estimated_error"]) <= 0.009 < np.sqrt(result.history[-2]["estimated_error"])
     samples = result.stats["samples"]
     same(result, gn.render(noisy, 16, 12, samples=int(samples)))
 
