@@ -69,11 +69,12 @@ def render_frame(engine, depsgraph):
         passes.add(engine, view_layer)
         result = _run(engine, session, view_layer, width, height)
     except (ValueError, OSError) as error:
-        raise ValueError(sync.explain(state, error)) from error
+        raise ValueError(sync.explain(state, str(error))) from error
     if result is None:
         return  # cancelled before there was anything to keep
+    plan = {sync.explain(state, key): sentence for key, sentence in native_scene.plan().items()}
     entry = statistics.record(
-        scene.name, view_layer.name, scene.frame_current, session, result, native_scene.plan(), state.warnings
+        scene.name, view_layer.name, scene.frame_current, session, result, plan, state.warnings
     )
     if scene.gpis.write_statistics and session.stop != "cancelled":
         statistics.write(entry, _beside_image(engine, scene, view_layer))

@@ -1,6 +1,9 @@
 """Volume datablocks and their .vdb files: where the file is, which grids it holds."""
 
+import hashlib
 import os
+import re
+from pathlib import Path
 
 import bpy
 
@@ -20,9 +23,22 @@ def path_of(data):
         path = bpy.path.abspath(data.grids.frame_filepath, library=data.library)
     path = os.path.normpath(path)
     if not os.path.isfile(path):
-        hint = " It is packed: unpack it (File, External Data)." if data.packed_file else ""
-        raise FileNotFoundError(f'the file "{path}" of volume "{data.name}" is not there.{hint}')
+        if data.packed_file:
+            return unpacked(data)
+        raise FileNotFoundError(f'the file "{path}" of volume "{data.name}" is not there.')
     return path
+
+
+def unpacked(data):
+    """Path of a packed file's bytes, written out under Blender's temporary folder: Blender packs volumes, but cannot
+    read what it has packed. Other bytes get another path, for it caches files by their paths."""
+    content = data.packed_file.data
+    name = re.sub(r"(\.v\d{4,})?(\.vdb)?$", ".v0001.vdb", bpy.path.basename(data.filepath), count=1)
+    path = Path(bpy.app.tempdir, "gpis", hashlib.sha256(content).hexdigest()[:16], name)
+    if not path.is_file():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    return str(path)
 
 
 def grids(path):

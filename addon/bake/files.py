@@ -14,11 +14,15 @@ from pathlib import Path
 import bpy
 from bpy.app.handlers import persistent
 
+from ..volume import unpacked
+
 _VERSIONED = re.compile(r"^(?P<name>.+)\.v(?P<version>\d{4,})\.vdb$")
 # Versions of a name that stay although nothing uses them, beside those of the backups.
 _KEPT = 2
 # Files made or used since the last load: undo may bring any of them back.
 _session = set()
+# (volume, its former file) of the save in hand.
+_adopted = []
 
 
 def folder(blend_path):
@@ -72,14 +76,25 @@ def _baked():
 def adopt(blend_path):
     """Copy the volumes' files into the folder of the .blend that is about to be saved."""
     place = folder(blend_path)
+    _adopted.clear()
     for volume, path in _baked():
         if path.parent == place or not path.is_file():
             continue
         place.mkdir(parents=True, exist_ok=True)
         target = _remember(_next(place, _VERSIONED.match(path.name)["name"]))
         shutil.copyfile(path, target)
+        _adopted.append((volume, volume.filepath))
         # Absolute: Blender makes it relative to the new place while it writes, if the artist wants relative paths.
         volume.filepath = str(target)
+
+
+def restore():
+    """Give volumes whose file is missing, but packed, a file again; the next save adopts it."""
+    for volume in bpy.data.volumes:
+        path = bpy.path.abspath(volume.filepath, library=volume.library)
+        if volume.packed_file and not volume.is_sequence and not os.path.isfile(path):
+            volume.filepath = unpacked(volume)
+            volume.gpis_baked = True
 
 
 def collect():
@@ -113,6 +128,10 @@ def _before_save(blend_path, _=None):
 
 @persistent
 def _after_save(blend_path, _=None):
+    if blend_path and os.path.normpath(blend_path) != os.path.normpath(bpy.data.filepath):
+        for volume, filepath in _adopted:  # Save Copy: the copy has files of its own, this .blend keeps its
+            volume.filepath = filepath
+    _adopted.clear()
     _session.update(path for _, path in _baked())
     collect()
 
@@ -120,6 +139,7 @@ def _after_save(blend_path, _=None):
 @persistent
 def _after_load(blend_path, _=None):
     _session.clear()
+    restore()
     _session.update(path for _, path in _baked())
     collect()
 

@@ -14,6 +14,8 @@ DEFAULT_LENGTH_SCALE = 0.1
 # The margin around the mesh, unless it is given: the surface at 4 σ is met once in 30,000 realisations.
 _MARGIN_SIGMAS = 4.0
 _LEAST_MARGIN = 0.1
+# Blender's ID_VO, the letters of its file format.
+_VOLUME_CODE = int.from_bytes(b"VO", "little")
 
 
 def mesh_arrays(depsgraph, source, matrix):
@@ -57,6 +59,8 @@ def bake(context, volume_object, *, resolution, margin):
     finally:
         window_manager.progress_end()
     data = volume_object.data
+    if data.packed_file:  # the old bytes, which Blender would otherwise keep
+        bpy.ops.file.unpack_item(id_name=data.name, id_type=_VOLUME_CODE, method="USE_ORIGINAL")
     data.filepath = bpy.path.relpath(str(path)) if bpy.data.filepath else str(path)
     data.gpis_baked = True
     settings.bake_resolution = resolution

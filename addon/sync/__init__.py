@@ -35,14 +35,28 @@ def _add(sync, obj, matrix_world):
         sync.warn(f'Object "{obj.name}" is left out: the GPIS engine does not render objects of type {obj.type}.')
 
 
-def explain(sync, error):
-    """The sentence of a native error, with the names an artist knows in place of paths such as `objects[2]`."""
-    text = str(error)
-    for group in ("objects", "lights"):
-
-        def name(match, entries=sync.description[group]):
-            index = int(match.group(1))
-            return f'"{entries[index]["name"]}"' if index < len(entries) else match.group(0)
-
-        text = re.sub(rf"\b{group}\[(\d+)\]", name, text)
+def explain(sync, text):
+    """A sentence of the native renderer with the names an artist knows in place of paths such as `objects[2].matrix`."""
+    for path, owner, name in _owners(sync):
+        if path in text:
+            text = re.sub(rf"(?<![\w.]){re.escape(path)}\.(?=\w)", lambda _, owner=owner: f"{owner}: ", text)
+            text = text.replace(f" of '{name}'", "")
     return text
+
+
+def _owners(sync):
+    """(path in the description, what the artist calls it, the description's own name of it)."""
+    description = sync.description
+    for i, entry in enumerate(description["objects"]):
+        kind = "GPIS object" if entry["type"] == "gpis" else "Object"
+        yield f"objects[{i}]", f'{kind} "{entry["name"]}"', entry["name"]
+    for i, entry in enumerate(description["lights"]):
+        yield f"lights[{i}]", f'Light "{entry["name"]}"', entry["name"]
+    for i, name in enumerate(description["materials"]):
+        yield f"materials[{i}]", f'Material "{name}"', name
+        yield f"materials['{name}']", f'Material "{name}"', name
+    for key, name in sync.mesh_owners.items():
+        yield f"meshes['{key}']", f'Object "{name}"', key
+    yield "camera", f'Camera "{sync.scene.camera.name}"', ""
+    if sync.scene.world is not None:
+        yield "world", f'World "{sync.scene.world.name}"', ""

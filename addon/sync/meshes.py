@@ -5,7 +5,7 @@
 import numpy as np
 
 from . import materials
-from .state import array
+from .state import SyncError, array
 
 
 def add(sync, obj, matrix_world):
@@ -17,7 +17,14 @@ def add(sync, obj, matrix_world):
         arrays = describe(mesh, len(names))
         if arrays is None:
             return  # no faces: nothing to see, in Cycles too
+        bad = np.flatnonzero(~np.isfinite(arrays["vertices"]).all(axis=1))
+        if bad.size:
+            raise SyncError(
+                f'Object "{obj.name}": vertex {bad[0]} of its mesh (modifiers applied) has a coordinate that is not a '
+                "finite number. Delete the vertex, or look for the modifier that made it."
+            )
         sync.description["meshes"][key] = arrays
+        sync.mesh_owners[key] = obj.name
     _warn_about_flags(sync, obj)
     sync.description["objects"].append(
         {"name": obj.name, "type": "mesh", "mesh": key, "matrix": array(matrix_world), "materials": names}

@@ -14,6 +14,7 @@ class Sync:
         self.depsgraph = depsgraph
         self.scene = depsgraph.scene
         self.description = {"version": 1, "lights": [], "materials": {}, "meshes": {}, "objects": []}
+        self.mesh_owners = {}  # key of `meshes` -> name of the first object that has it
         self.warnings = []
 
     def warn(self, sentence):

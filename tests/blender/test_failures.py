@@ -98,6 +98,48 @@ def test_nan_voxels(stage, tmp_path):
     assert '"Cloud"' in sentence and ("NaN" in sentence or "finite" in sentence)
 
 
+def test_vertices_that_are_not_numbers(stage, tmp_path):
+    obj = support.cube(stage, "Crooked", material=support.diffuse("Paint", (0.5, 0.5, 0.5)))
+    obj.data.name = "Some Data"
+    obj.data.vertices[3].co.y = float("nan")
+    sentence = support.failure(stage, tmp_path)
+    assert 'Object "Crooked": vertex 3 of its mesh' in sentence and "Some Data" not in sentence
+
+
+@pytest.mark.parametrize(
+    "group, entry, member, value, expected",
+    [
+        ("objects", "Cube.2", "matrix", np.diag((1, 1, 0, 1)), 'Object "Cube.2": matrix flattens'),
+        ("objects", "Sphere GPIS", "matrix", np.diag((1, 1, 0, 1)), 'GPIS object "Sphere GPIS": matrix flattens'),
+        ("lights", "Point.2", "power", np.inf, 'Light "Point.2": power is inf'),
+        ("materials", "Paint", "color", (2.0, 0.0, 0.0), 'Material "Paint": color is (2, 0, 0)'),
+        ("camera", None, "clip", (2.0, 1.0), 'Camera "Camera": clip is (2, 1)'),
+        ("world", None, "strength", -1.0, 'World "World": strength is -1'),
+    ],
+)
+def test_native_sentences_name_what_the_artist_knows(
+    stage, ball, extension, tmp_path, group, entry, member, value, expected
+):
+    """Whatever the native side refuses: no path of the description is left in the sentence."""
+    sync = importlib.import_module(extension + ".sync")
+    for name in ("Cube.1", "Cube.2"):
+        support.cube(stage, name, material=bpy.data.materials.get("Paint") or support.diffuse("Paint", (0.5, 0.5, 0.5)))
+    for name in ("Point.1", "Point.2"):
+        support.light(stage, "POINT", 10).name = name
+    bpy.context.view_layer.update()
+    state = sync.describe(bpy.context.evaluated_depsgraph_get(), 16, 16)
+    place = state.description[group]
+    if isinstance(place, list):
+        place = next(item for item in place if item["name"] == entry)
+    elif entry is not None:
+        place = place[entry]
+    place[member] = value
+    with pytest.raises(ValueError) as caught:
+        importlib.import_module("gpis_native").Scene(state.description)
+    sentence = sync.explain(state, str(caught.value))
+    assert sentence.startswith(expected) and f"{group}[" not in sentence and " of '" not in sentence
+
+
 def test_zero_scale(stage, ball, tmp_path):
     ball.scale.y = 0
     sentence = support.failure(stage, tmp_path)

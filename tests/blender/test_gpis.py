@@ -1,6 +1,7 @@
 """GPIS objects: from a mesh, from a Volume object, and what is kept of them in the file."""
 
 import importlib
+import shutil
 from pathlib import Path
 
 import bpy
@@ -222,6 +223,58 @@ def test_save_as_gives_the_copy_files_of_its_own(stage, ball, tmp_path):
     second = Path(bpy.path.abspath(ball.data.filepath))
     assert first.parent.name == "a_gpis" and second.parent.name == "b_gpis"
     assert first.read_bytes() == second.read_bytes()
+
+
+def test_save_copy_changes_nothing_here(stage, ball, tmp_path):
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    first = ball.data.filepath
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "copy.blend"), copy=True)
+    assert ball.data.filepath == first and first.startswith("//a_gpis")
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "copy.blend"))
+    assert Path(bpy.path.abspath(bpy.data.volumes[0].filepath)).parent.name == "copy_gpis"
+
+
+def test_a_packed_file_renders_elsewhere(stage, ball, tmp_path):
+    """The .blend alone, its folder gone: as before; the next save puts the bake beside it."""
+    there = tmp_path / "there"
+    there.mkdir()
+    expected = coverage(stage, tmp_path)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "packed.blend"))
+    bpy.ops.file.pack_all()
+    bpy.ops.wm.save_mainfile()
+    shutil.move(tmp_path / "packed.blend", there)
+    shutil.rmtree(tmp_path / "packed_gpis")
+    bpy.ops.wm.open_mainfile(filepath=str(there / "packed.blend"))
+    assert Path(bpy.data.volumes[0].filepath).is_file()
+    assert np.array_equal(coverage(bpy.context.scene, tmp_path), expected)
+    bpy.ops.wm.save_mainfile()
+    ball = bpy.data.objects["Sphere GPIS"]
+    assert Path(bpy.path.abspath(ball.data.filepath)).parent == there / "packed_gpis"
+    bpy.context.view_layer.objects.active = ball
+    assert bpy.ops.gpis.rebake(resolution=16) == {"FINISHED"}
+    assert ball.data.packed_file is None, "the old bytes"
+
+
+def test_appended_from_a_packed_file(stage, ball, tmp_path):
+    """No load, so nothing is restored before the render asks for it."""
+    expected = coverage(stage, tmp_path)
+    bpy.ops.file.pack_all()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "packed.blend"), copy=True)
+    shutil.rmtree(tmp_path / "packed_gpis")
+    for obj in (ball, ball.gpis.source):
+        bpy.data.objects.remove(obj)
+    with bpy.data.libraries.load(str(tmp_path / "packed.blend"), link=True) as (_, loaded):
+        loaded.objects = ["Sphere GPIS"]
+    stage.collection.objects.link(loaded.objects[0])
+    assert np.array_equal(coverage(stage, tmp_path), expected)
+
+
+def test_choosers_list_scalar_grids_only(stage, ball, extension, tmp_path):
+    values = np.ones((4, 4, 4))
+    grids = {"mean": values, "sigma": values, "albedo": np.ones((4, 4, 4, 3)), "origin": (0.0,) * 3, "voxel_size": 1.0}
+    importlib.import_module("gpis_native").write_vdb(str(tmp_path / "many.vdb"), grids)
+    ball.data.filepath = str(tmp_path / "many.vdb")
+    assert set(importlib.import_module(extension + ".volume").grid_names(ball.data)) == {"mean", "sigma"}
 
 
 def test_the_bake_of_a_backup_stays(stage, ball, tmp_path):
