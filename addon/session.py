@@ -14,6 +14,14 @@ from dataclasses import dataclass, field
 BLOCK = 16
 # Below this the error is estimated from too few blocks to stop by.
 MINIMUM_FOR_NOISE = 4 * BLOCK
+# Samples of the sketches: pictures before the first block is there. They cannot be merged with anything (they are no
+# whole block) and are thrown away, so they are made only where an artist would wait for longer than this many seconds.
+SKETCHES = (1, 4)
+PATIENCE = 2.0
+# What a fast scene does in a second, for before the first sketch tells the pace.
+_PATHS_PER_SECOND = 1e6
+# Seconds that a round may take: an artist sees the picture change, and rounds that double would soon take minutes.
+LONGEST_ROUND = 20.0
 
 
 @dataclass(frozen=True)
@@ -49,14 +57,16 @@ class Round:
 def next_round(limits, samples, seconds, error):
     """The next round after `samples` in `seconds` with relMSE `error` (None: unknown).
 
-    Rounds double, so that pictures come early and their cost stays a fraction of the render; the last is cut to what
-    the noise threshold needs.
+    Rounds double up to LONGEST_ROUND, so that pictures come early and their cost stays a fraction of the render; the
+    last is cut to what the noise threshold needs.
     """
     if limits.samples is not None and samples >= limits.samples:
         return Round(0, stop="samples")
     if samples and limits.time_limit is not None and seconds >= limits.time_limit:
         return Round(0, stop="time limit")
     count = max(BLOCK, samples)
+    if seconds > 0:
+        count = min(count, max(BLOCK, int(LONGEST_ROUND * samples / seconds) // BLOCK * BLOCK))
     needed = limits.samples_for_noise(samples, error)
     if needed is not None:
         if samples >= needed:
@@ -66,6 +76,16 @@ def next_round(limits, samples, seconds, error):
         count = min(count, limits.samples - samples)  # only the last round may end inside a block
     time_left = None if limits.time_limit is None else max(limits.time_limit - seconds, 0.001)
     return Round(count, time_left)
+
+
+def next_sketch(limits, sketches, seconds, paths):
+    """Samples of the sketch that comes after the `sketches` made in `seconds` of `paths` pixels each, 0: none."""
+    if len(sketches) == len(SKETCHES) or (limits.samples is not None and limits.samples <= BLOCK):
+        return 0
+    pace = sum(sketches) * paths / seconds if sketches and seconds > 0 else _PATHS_PER_SECOND
+    block = BLOCK * paths / pace
+    enough = limits.time_limit is None or 2 * block < limits.time_limit - seconds
+    return SKETCHES[len(sketches)] if block > PATIENCE and enough else 0
 
 
 @dataclass
@@ -105,7 +125,7 @@ class Session:
     """Renders `scene` (a native scene) with `renderer` (the native module) until the limits say so or `cancel()`.
 
     start(), then poll progress() and latest() from the same thread, then finish(), which gives the result or raises
-    what the worker raised. After cancel() the result holds the rounds that were complete, or None.
+    what the worker raised. After cancel() the result holds the rounds that were complete, else a sketch, else None.
     """
 
     renderer: object
@@ -164,7 +184,38 @@ class Session:
         finally:
             self._done.set()
 
+    def _sketch(self):
+        """Coarse pictures at once where the first block takes long; False where they were cancelled."""
+        made = []
+        while True:
+            seconds = time.monotonic() - self._began
+            count = next_sketch(self.limits, made, seconds, self.width * self.height)
+            if not count:
+                return True
+            result = self._render(count, None, 0)
+            if result.stats["cancelled"]:
+                self.stop = "cancelled"
+                return False
+            made.append(count)
+            self._keep(result, 0, None)
+
+    def _render(self, samples, time_limit, first):
+        return self.renderer.render(
+            self.scene,
+            self.width,
+            self.height,
+            samples=samples,
+            time_limit=time_limit,
+            first_sample=first,
+            seed=self.limits.seed,
+            threads=self.limits.threads,
+            progress=self._reporter(first),
+        )
+
     def _rounds(self):
+        if not self._sketch():
+            return
+        whole = None  # of the rounds that are complete
         samples, error = 0, None
         while True:
             seconds = time.monotonic() - self._began
@@ -172,26 +223,16 @@ class Session:
             if not step.samples:
                 self.stop = step.stop
                 return
-            part = self.renderer.render(
-                self.scene,
-                self.width,
-                self.height,
-                samples=step.samples,
-                time_limit=step.time_left,
-                first_sample=samples,
-                seed=self.limits.seed,
-                threads=self.limits.threads,
-                progress=self._reporter(samples),
-            )
+            part = self._render(step.samples, step.time_left, samples)
             cancelled = part.stats["cancelled"]
-            if cancelled and self._result is None:
+            if cancelled and whole is None:
                 self.stop = "cancelled"  # some pixels have no sample yet: no picture
                 return
-            result = part if self._result is None else self.renderer.merge([self._result, part])
+            whole = part if whole is None else self.renderer.merge([whole, part])
             samples += step.samples
-            error = result.stats["estimated_error"]
+            error = whole.stats["estimated_error"]
             error = error if math.isfinite(error) else None
-            self._keep(result, samples, error)
+            self._keep(whole, samples, error)
             if cancelled or part.stats["stopped_by"] == "time":
                 self.stop = "cancelled" if cancelled else "time limit"
                 return
@@ -203,7 +244,7 @@ class Session:
             self.history.append({"seconds": seconds, "samples": result.stats["samples"], "estimated_error": error})
             self._samples_needed = self.limits.samples_for_noise(samples, error)
             self._progress = Progress(
-                self._fraction(samples),
+                max(self._progress.fraction, self._fraction(samples)),
                 seconds,
                 samples,
                 None if error is None else math.sqrt(error),
@@ -215,7 +256,7 @@ class Session:
             done = first + stats["samples"]
             with self._lock:
                 self._progress.samples = int(done)
-                self._progress.fraction = self._fraction(done)
+                self._progress.fraction = max(self._progress.fraction, self._fraction(done))  # a bar never goes back
                 return not self._cancel
 
         return report

@@ -57,6 +57,8 @@ def run(session, renderer, **limits):
         ({"samples": 100}, (16, 1, 0.1), 16),
         ({"samples": 100}, (64, 1, 0.1), 36),
         ({"samples": 100}, (100, 1, 0.1), "samples"),
+        ({"samples": 4096}, (1024, 40, 0.1), 512),
+        ({"samples": 4096}, (16, 90, 0.1), 16),
         ({"samples": None, "time_limit": 5}, (0, 9, None), 16),
         ({"samples": None, "time_limit": 5}, (32, 4, 0.1), 32),
         ({"samples": None, "time_limit": 5}, (32, 5.1, 0.1), "time limit"),
@@ -81,6 +83,49 @@ def test_rounds_are_slices_of_whole_blocks(session):
     assert result.stats["samples"] == 100 and running.stop == "samples"
     assert [entry["samples"] for entry in running.history] == [16, 32, 64, 100]
     assert renderer.thread is not threading.current_thread()
+
+
+@pytest.mark.parametrize(
+    "limits, made, seconds, paths, expected",
+    [
+        ({"samples": 128}, [], 0, 1920 * 1080, 1),
+        ({"samples": 128}, [1], 8, 1920 * 1080, 4),
+        ({"samples": 128}, [1], 0.1, 1920 * 1080, 0),  # the block is there in 1.6 s
+        ({"samples": 128}, [1, 4], 40, 1920 * 1080, 0),
+        ({"samples": 128}, [], 0, 320 * 240, 0),
+        ({"samples": 16}, [], 0, 1920 * 1080, 0),
+        ({"samples": None, "time_limit": 10}, [], 0, 1920 * 1080, 0),  # it would take from the picture itself
+        ({"samples": None, "time_limit": 100}, [], 0, 1920 * 1080, 1),
+    ],
+)
+def test_sketches_come_where_the_first_block_takes_long(session, limits, made, seconds, paths, expected):
+    assert session.next_sketch(session.Limits(**limits), made, seconds, paths) == expected
+
+
+def test_sketches_are_shown_and_thrown_away(session, monkeypatch):
+    monkeypatch.setattr(session, "PATIENCE", 0.02)
+    renderer = Counting(pace=0.002)
+    running = session.Session(renderer, None, 1000, 1000, session.Limits(samples=100))
+    running.start()
+    fractions, pictures = [], set()
+    while not running.wait(0.001):
+        fractions.append(running.progress().fraction)
+        if running.latest() is not None:
+            pictures.add(running.latest().stats["samples"])
+    assert renderer.calls == [(0, 1), (0, 4), (0, 16), (16, 16), (32, 32), (64, 36)]
+    assert running.finish().stats["samples"] == 100
+    assert {1, 4, 16} <= pictures and fractions == sorted(fractions)
+
+
+def test_cancel_in_the_first_block_keeps_the_sketch(session, monkeypatch):
+    monkeypatch.setattr(session, "PATIENCE", 0.02)
+    renderer = Counting(pace=0.01)
+    running = session.Session(renderer, None, 1000, 1000, session.Limits(samples=100))
+    running.start()
+    while len(renderer.calls) < 3:
+        time.sleep(0.001)
+    running.cancel()
+    assert running.finish().stats["samples"] == 4 and running.stop == "cancelled"
 
 
 def test_noise_threshold_is_met_without_much_overshoot(session):
