@@ -101,7 +101,7 @@ class Progress:
     @property
     def remaining(self):
         """Seconds that are left at the pace so far, None before there is a pace."""
-        if self.fraction < 1e-3:
+        if self.fraction < 1e-5:
             return None
         return self.seconds * (1.0 - self.fraction) / self.fraction
 
