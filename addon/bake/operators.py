@@ -18,8 +18,8 @@ _LEAST_MARGIN = 0.1
 _VOLUME_CODE = int.from_bytes(b"VO", "little")
 
 
-def mesh_arrays(depsgraph, source, matrix):
-    """Vertices (N,3) and triangles (M,3) of a mesh object with its modifiers, mapped by `matrix` (4,4)."""
+def mesh_arrays(depsgraph, source):
+    """Vertices (N,3) and triangles (M,3) of a mesh object with its modifiers, in its own coordinates."""
     evaluated = source.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
     try:
@@ -28,16 +28,15 @@ def mesh_arrays(depsgraph, source, matrix):
         vertices, triangles, _ = meshes.triangles(mesh)
     finally:
         evaluated.to_mesh_clear()
-    return vertices.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3], triangles
+    return vertices.astype(np.float64), triangles
 
 
 def bake(context, volume_object, *, resolution, margin):
     """Bake the object's source into a new .vdb and give it to the object; returns what the native bake says."""
     settings = volume_object.gpis
     source = settings.source
-    depsgraph = context.evaluated_depsgraph_get()
-    relative = volume_object.matrix_world.inverted_safe() @ source.matrix_world
-    vertices, triangles = mesh_arrays(depsgraph, source, np.array(relative))
+    # The mesh's coordinates are the volume's: a GPIS that was moved away from its mesh stays there.
+    vertices, triangles = mesh_arrays(context.evaluated_depsgraph_get(), source)
     size = float(max(vertices.max(axis=0) - vertices.min(axis=0)))
     if not np.isfinite(size):
         raise ValueError(f'Object "{source.name}" has vertices whose coordinates are not numbers.')
@@ -59,6 +58,9 @@ def bake(context, volume_object, *, resolution, margin):
     finally:
         window_manager.progress_end()
     data = volume_object.data
+    # Blender's Duplicate shares the data; a bake of another mesh is data of its own.
+    if any(other.data == data and other.gpis.source != source for other in bpy.data.objects):
+        data = volume_object.data = data.copy()
     if data.packed_file:  # the old bytes, which Blender would otherwise keep
         bpy.ops.file.unpack_item(id_name=data.name, id_type=_VOLUME_CODE, method="USE_ORIGINAL")
     data.filepath = bpy.path.relpath(str(path)) if bpy.data.filepath else str(path)
@@ -101,7 +103,26 @@ def make(context, source, *, resolution, margin=0.0):
     volume_object.display_type = "BOUNDS"  # the distance drawn as fog would be a block
     source.hide_render = True
     source.display_type = "WIRE"
+    source.gpis.is_source = True
     return volume_object, report
+
+
+def made_of(source):
+    """The GPIS objects that were made of a mesh object."""
+    return [child for child in source.children if child.type == "VOLUME" and child.gpis.source == source]
+
+
+def remove(source, volume_objects):
+    """Delete GPIS objects of a mesh; without any the mesh is rendered again."""
+    for volume_object in volume_objects:
+        data = volume_object.data
+        bpy.data.objects.remove(volume_object)
+        if data.users == 0:
+            bpy.data.volumes.remove(data)
+    if not made_of(source):
+        source.hide_render = False
+        source.display_type = "TEXTURED"
+        source.gpis.is_source = False
 
 
 def note(volume_object, report):
@@ -195,7 +216,31 @@ class GPIS_OT_rebake(_Bake, bpy.types.Operator):
         return self.run(bake_one, [context.active_object])
 
 
-_CLASSES = (GPIS_OT_make, GPIS_OT_rebake)
+class GPIS_OT_remove(bpy.types.Operator):
+    """Delete the GPIS and render its mesh again"""
+
+    bl_idname = "gpis.remove"
+    bl_label = "Remove GPIS"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        obj = context.active_object
+        if obj is None or context.mode != "OBJECT":
+            return False
+        return obj.gpis.is_source if obj.type == "MESH" else obj.type == "VOLUME" and obj.gpis.source is not None
+
+    def execute(self, context):
+        obj = context.active_object
+        source = obj if obj.type == "MESH" else obj.gpis.source
+        remove(source, made_of(source) if obj == source else [obj])
+        if source.name in context.view_layer.objects:
+            source.select_set(True)
+            context.view_layer.objects.active = source
+        return {"FINISHED"}
+
+
+_CLASSES = (GPIS_OT_make, GPIS_OT_rebake, GPIS_OT_remove)
 
 
 def register():

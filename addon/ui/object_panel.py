@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 
 from .. import volume
+from ..bake.operators import made_of
 from .render_panels import ENGINE
 
 
@@ -33,12 +34,26 @@ class GPIS_PT_object(bpy.types.Panel):
         layout.use_property_split = True
         layout.use_property_decorate = False
         if context.object.type == "MESH":
-            layout.operator("gpis.make", icon="VOLUME_DATA")
+            _draw_mesh(layout, context.object)
             return
         layout.active = context.object.gpis.enabled
         _draw_fields(layout, context)
         _draw_kernel(layout, context)
         _draw_source(layout, context.object.gpis)
+
+
+def _draw_mesh(layout, obj):
+    if not obj.gpis.is_source:
+        layout.operator("gpis.make", icon="VOLUME_DATA")
+        return
+    column = layout.column(align=True)
+    for volume_object in made_of(obj):
+        column.label(text=f'Source of "{volume_object.name}"', icon="VOLUME_DATA")
+    if not made_of(obj):
+        column.label(text="Its GPIS was deleted", icon="INFO")
+    if obj.hide_render:
+        column.label(text="Not rendered itself")
+    layout.operator("gpis.remove", icon="X", text="Remove GPIS" if made_of(obj) else "Render the Mesh Again")
 
 
 def _draw_fields(layout, context):
@@ -91,7 +106,9 @@ def _draw_source(layout, settings):
     layout.separator()
     layout.prop(settings, "source")
     layout.prop(settings, "bake_resolution")
-    layout.operator("gpis.rebake", icon="FILE_REFRESH")
+    row = layout.row(align=True)
+    row.operator("gpis.rebake", icon="FILE_REFRESH")
+    row.operator("gpis.remove", icon="X", text="Remove")
 
 
 def register():

@@ -101,6 +101,8 @@ def _on_enabled(settings, context):
     data = settings.id_data.data
     if not settings.enabled or not isinstance(data, bpy.types.Volume):
         return
+    if settings.id_data.display_type == "TEXTURED":
+        settings.id_data.display_type = "BOUNDS"  # a distance drawn as fog would be a block
     names = volume.grid_names(data)
     if not settings.mean_grid and ("mean" in names or len(names) == 1):
         settings.mean_grid = "mean" if "mean" in names else names[0]
@@ -205,6 +207,9 @@ class GPIS_ObjectProperties(bpy.types.PropertyGroup):
     )
     source: PointerProperty(
         name="Source", description="Mesh that the signed distance is baked from", type=bpy.types.Object
+    )
+    is_source: BoolProperty(
+        name="Source of a GPIS", description="A GPIS was made of this mesh, which is not rendered itself", default=False
     )
     bake_resolution: IntProperty(
         name="Resolution", description="Grid nodes along the longest side at the last bake", default=96, min=8, max=2048

@@ -277,6 +277,65 @@ def test_choosers_list_scalar_grids_only(stage, ball, extension, tmp_path):
     assert set(importlib.import_module(extension + ".volume").grid_names(ball.data)) == {"mean", "sigma"}
 
 
+def test_remove_gives_the_mesh_back(stage, ball):
+    mesh = ball.gpis.source
+    bpy.context.view_layer.objects.active = ball
+    assert bpy.ops.gpis.remove() == {"FINISHED"}
+    assert list(bpy.data.volumes) == [] and bpy.context.object == mesh
+    assert not mesh.hide_render and mesh.display_type == "TEXTURED" and not bpy.ops.gpis.remove.poll()
+
+
+def test_remove_after_the_gpis_was_deleted(stage, ball):
+    mesh = ball.gpis.source
+    mesh.select_set(False)
+    bpy.ops.object.delete()
+    bpy.context.view_layer.objects.active = mesh
+    assert bpy.ops.gpis.remove() == {"FINISHED"} and not mesh.hide_render
+
+
+def test_a_duplicate_of_another_mesh_bakes_for_itself(stage, ball):
+    """Blender's Duplicate shares a volume's data: one bake would change both."""
+    mesh = ball.gpis.source
+    for obj in (mesh, ball):
+        obj.select_set(True)
+    bpy.ops.object.duplicate()
+    copy = next(obj for obj in bpy.context.selected_objects if obj.type == "VOLUME")
+    assert copy.data == ball.data and copy.gpis.source not in (None, mesh)
+    before = ball.data.filepath
+    bpy.context.view_layer.objects.active = copy
+    bpy.ops.gpis.rebake(resolution=12)
+    assert copy.data != ball.data and ball.data.filepath == before != copy.data.filepath
+
+
+def test_a_moved_gpis_stays_there_when_baked_again(stage, ball, extension):
+    mesh = ball.gpis.source
+    mesh.location, ball.location = (0, 5, 0), (2, 0, 0)
+    bpy.context.view_layer.objects.active = ball
+    bpy.ops.gpis.rebake(resolution=16)
+    volume = importlib.import_module(extension + ".volume")
+    (grid,) = volume.grids(volume.path_of(ball.data))
+    assert np.add(grid["min"], grid["max"]) == pytest.approx(0, abs=0.05)
+    assert tuple(ball.matrix_world.translation) == (2, 5, 0)
+
+
+def test_undo_of_a_bake(stage, ball):
+    """The path is part of the datablock, and no file is rewritten."""
+    bpy.context.view_layer.objects.active = ball
+    bpy.ops.ed.undo_push(message="made")
+    before = ball.data.filepath
+    bpy.ops.gpis.rebake(resolution=12)
+    ball.gpis.sigma, ball.gpis.memory = 0.3, "NONE"
+    bpy.ops.ed.undo_push(message="baked")
+    after = ball.data.filepath
+    bpy.ops.ed.undo()
+    ball = bpy.data.objects["Sphere GPIS"]
+    assert ball.data.filepath == before != after and Path(before).is_file()
+    assert ball.gpis.memory == "RENEWAL_PLUS" and ball.gpis.sigma == pytest.approx(0.04, rel=1e-3)
+    bpy.ops.ed.redo()
+    ball = bpy.data.objects["Sphere GPIS"]
+    assert ball.data.filepath == after and Path(after).is_file() and ball.gpis.memory == "NONE"
+
+
 def test_the_bake_of_a_backup_stays(stage, ball, tmp_path):
     """Several bakes between two saves: the .blend1 still opens with its own."""
     blend = tmp_path / "scene.blend"
