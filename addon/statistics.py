@@ -1,6 +1,7 @@
 """What the last render did, kept for the panel, the operator and the file beside the image."""
 
 import json
+import math
 
 # Name of scene -> record of its last render. Plain values, never Blender's.
 _last = {}
@@ -34,19 +35,25 @@ def forget():
 
 
 def write(entry, path):
+    """JSON as strict readers take it, which knows no infinity: what is not known (yet) is null.
+
+    So `estimated_error`, which takes two samples a pixel, is null after one.
+    """
     with open(path, "w", encoding="utf-8") as file:
-        json.dump(entry, file, indent=1)
+        json.dump(entry, file, indent=1, allow_nan=False)
         file.write("\n")
 
 
 def plain(value):
-    """Only what JSON knows: numpy scalars and arrays, tuples and objects' dicts are turned into it."""
+    """Only what JSON knows: numpy scalars and arrays, tuples and objects' dicts are turned into it, inf and NaN to None."""
     if isinstance(value, dict):
         return {str(key): plain(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):
         return [plain(entry) for entry in value]
     if hasattr(value, "tolist"):
         return plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
     if isinstance(value, (str, int, float, bool)) or value is None:
         return value
     return str(value)

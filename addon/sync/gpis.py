@@ -10,6 +10,9 @@ from .state import SyncError, array
 # Deviations between the surface and the bounds below which a visible part of the surfaces is cut off (one in 740).
 _SAFE_DEVIATIONS = 3.0
 
+# What an infinity that is typed into a panel becomes: Blender keeps the largest number of single precision.
+_INFINITE = float(np.finfo(np.float32).max)
+
 
 def add(sync, obj, matrix_world):
     if not obj.gpis.enabled:
@@ -48,8 +51,7 @@ def _process(sync, owner, obj):
     gn = native()
     mean = gn.VdbField(path, settings.mean_grid, meaning="value")
     if settings.sigma_source == "CONSTANT":
-        if not settings.sigma > 0:
-            raise SyncError(f"{owner}: the standard deviation σ is {settings.sigma:g}, it must be above 0.")
+        _check_positive(owner, "standard deviation σ", settings.sigma)
         sigma = gn.ConstantField(settings.sigma)
         _warn_if_cut(sync, owner, obj, settings.sigma)
     else:
@@ -59,16 +61,21 @@ def _process(sync, owner, obj):
                 f'{owner}: say whether grid "{settings.sigma_grid}" holds the standard deviation σ or the variance σ² '
                 "(Object properties, GPIS). Files differ, and names do not tell."
             )
-        if not settings.sigma_factor > 0:
-            raise SyncError(f"{owner}: the factor on σ is {settings.sigma_factor:g}, it must be above 0.")
+        _check_positive(owner, "factor on σ", settings.sigma_factor)
         meaning = "variance" if settings.sigma_meaning == "VARIANCE" else "value"
         sigma = gn.VdbField(path, settings.sigma_grid, meaning=meaning)
         if settings.sigma_factor != 1:
             sigma = settings.sigma_factor * sigma
-    if not settings.length_scale > 0:
-        raise SyncError(f"{owner}: the length scale ℓ is {settings.length_scale:g}, it must be above 0.")
+    _check_positive(owner, "length scale ℓ", settings.length_scale)
     kernel = gn.SquaredExponential(settings.length_scale)
     return gn.GaussianProcess(mean, sigma, kernel, bounds=(mean_grid["min"], mean_grid["max"]))
+
+
+def _check_positive(owner, what, value):
+    if not value > 0:
+        raise SyncError(f"{owner}: the {what} is {value:g}, it must be above 0.")
+    if value >= _INFINITE:
+        raise SyncError(f"{owner}: the {what} is infinite, it must be a finite number.")
 
 
 def _grid(owner, what, name, grids, path):

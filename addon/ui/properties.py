@@ -75,7 +75,8 @@ class GPIS_SceneProperties(bpy.types.PropertyGroup):
     )
     write_statistics: BoolProperty(
         name="Write beside the Image",
-        description="Write the statistics of each frame as JSON to the output path, beside the image",
+        description="Write the statistics of each frame as JSON to the output path, beside the image. What is not known, "
+        "such as the error after a single sample, is null there",
         default=False,
     )
 

@@ -75,6 +75,14 @@ def test_zero_deviation_and_length(stage, ball, tmp_path, name, word):
     assert word in sentence and '"Sphere GPIS"' in sentence
 
 
+@pytest.mark.parametrize("name, word", [("sigma", "standard deviation σ"), ("length_scale", "length scale ℓ")])
+def test_infinite_deviation_and_length(stage, ball, tmp_path, name, word):
+    setattr(ball.gpis, name, float("inf"))
+    assert np.isfinite(getattr(ball.gpis, name))  # Blender keeps a number, 3.4e38
+    sentence = support.failure(stage, tmp_path)
+    assert f"{word} is infinite" in sentence and '"Sphere GPIS"' in sentence
+
+
 def test_negative_deviation_in_a_grid(stage, tmp_path):
     values = np.full((8, 8, 8), 0.1)
     values[3, 4, 5] = -0.2

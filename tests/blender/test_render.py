@@ -123,6 +123,18 @@ def test_statistics_beside_the_image_and_by_operator(stage, tmp_path):
     assert json.loads((tmp_path / "saved.json").read_text()) == entry
 
 
+def test_statistics_are_strict_json(stage, tmp_path):
+    """A single sample has no error estimate: null, for JSON knows no infinity."""
+    stage.gpis.write_statistics, stage.gpis.samples = True, 1
+    support.picture(stage, tmp_path)
+
+    def refuse(constant):
+        raise AssertionError(f"{constant} is no JSON")
+
+    entry = json.loads((tmp_path / "GPIS-0.json").read_text(), parse_constant=refuse)
+    assert entry["history"][-1]["estimated_error"] is None and entry["stats"]["estimated_error"] is None
+
+
 def test_time_limit_and_noise_threshold_end_the_render(stage, tmp_path):
     stage.gpis.use_samples, stage.gpis.write_statistics = False, True
     stage.gpis.time_limit = 0.5
