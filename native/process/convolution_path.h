@@ -15,6 +15,8 @@ namespace gpis {
 
 class ConvolutionPath {
  public:
+  static constexpr int kStride = 2;
+  static constexpr double kLastStep = 1e-5;
   struct Plan {
     Plan(const GaussianProcess& process, const Box3& bounds);
     double correlation_error = 9e-8;

@@ -14,6 +14,8 @@ namespace gpis {
 
 class DensePath {
  public:
+  static constexpr int kStride = 1;
+  static constexpr double kLastStep = 1e-5;
   struct Plan {
     Plan(const GaussianProcess& process, const Box3& bounds);
     double correlation_error = 2e-4;

@@ -33,9 +33,8 @@ class March {
     smooth_step_ = 0.25 * plan.smooth_scale / speed;
     // |∂⁴ mean| <= 12 / scale³ along a unit-speed line (a sphere's distance); a cubic through both
     // ends is off by h⁴/384 of it.
-    mean_deviation_ = std::isinf(plan.smooth_scale)
-                          ? 0
-                          : 0.05 * std::pow(speed, 4) / std::pow(plan.smooth_scale, 3);
+    const double curvature = speed / plan.smooth_scale;
+    mean_deviation_ = 0.05 * speed * curvature * curvature * curvature;
     mean_slope_ = plan.mean_lipschitz * speed;
     sigma_slope_ = plan.sigma_lipschitz * speed;
   }
@@ -66,6 +65,7 @@ class March {
     bool new_piece = false;
     for (int steps = 0; steps < kMaxSteps; ++steps) {
       b = step_end(a, t_end);
+      last_cell_ = cell_;
       const double whole = std::min(cell_end(), t_end);
       Point to;
       if (kBreaks && piece_end_ < whole && tried_cell_ != cell_ &&
@@ -73,6 +73,7 @@ class March {
         b = whole;
         new_piece = true;
       } else {
+        if (Path::kStride > 1 && b == cell_end()) b = stride_end(from, b, t_end);
         enter(a, b);
         if (new_piece) from = combine(a, from.g, from.dg);  // same path, fields of the new piece
         to = evaluate_end(b);
@@ -80,18 +81,19 @@ class March {
         new_piece = kBreaks && b == piece_end_;
       }
       line_.stretches.back().end = b;
-      line_.stretches.back().last_cell = cell_;
+      line_.stretches.back().last_cell = last_cell_;
       if (b >= t_end) return kInfinity;
 
       from = to;
       a = b;
-      if (b == cell_end()) ++cell_;
+      if (b == cell_end(last_cell_)) cell_ = last_cell_ + 1;
       if (to.mean > threshold_at(a)) {
         const double clear = mean_.above_until(a, t_end, threshold_at(a));
         if (clear >= t_end) return kInfinity;
         if (clear - a > step_) {
           a = clear;
           cell_ = static_cast<long>(std::floor((a - line_.anchor) / step_));
+          last_cell_ = cell_;
           path_.prepare(cell_, rng_, counters_);
           enter(a, step_end(a, t_end));
           from = evaluate(a);
@@ -118,7 +120,8 @@ class March {
     double mean, sigma, dsigma;  // of the fields
   };
 
-  double cell_end() const { return line_.anchor + (cell_ + 1) * step_; }
+  double cell_end(long cell) const { return line_.anchor + (cell + 1) * step_; }
+  double cell_end() const { return cell_end(cell_); }
 
   double step_end(double a, double t_end) {
     piece_end_ = kInfinity;
@@ -128,6 +131,17 @@ class March {
     // Nothing ends the step: a constant path over a mean without curvature. Steps that double end
     // it.
     return b < kInfinity ? b : a + 1 + (a - line_.anchor);
+  }
+
+  // Where the surface is far enough for the test to have a chance, the step goes on to the end of
+  // the next cell.
+  double stride_end(const Point& from, double b, double t_end) {
+    const double far = cell_end(cell_ + 1), h = far - from.t;
+    if (!(far <= std::min({from.t + smooth_step_, t_end, piece_end_}))) return b;
+    if (!(from.f > path_.deviation(h) * from.sigma && from.f + h * from.df / 3 > 0)) return b;
+    last_cell_ = cell_ + 1;
+    path_.prepare(last_cell_, rng_, counters_);
+    return far;
   }
 
   void enter(double a, double b) {
@@ -160,15 +174,23 @@ class March {
 
   Point evaluate(double t) {
     double g, dg;
-    path_.at(cell_, t, rng_, g, dg);
+    path_.at(t < cell_end() ? cell_ : last_cell_, t, rng_, g, dg);
     return combine(t, g, dg);
   }
 
   Point evaluate_end(double b) {
-    if (b != cell_end()) return evaluate(b);
+    if (b != cell_end(last_cell_)) return evaluate(b);
+    double g, dg;
+    path_.at_right(last_cell_, g, dg);
+    return combine(b, g, dg);
+  }
+
+  // The middle of a step: of two cells it is where they meet.
+  Point evaluate_middle(const Point& a, const Point& b) {
+    if (last_cell_ == cell_ || b.t - a.t < 1.5 * step_) return evaluate(a.t + 0.5 * (b.t - a.t));
     double g, dg;
     path_.at_right(cell_, g, dg);
-    return combine(b, g, dg);
+    return combine(cell_end(), g, dg);
   }
 
   // A cell of the path that holds many pieces of the fields (voxels), crossed at once where bounds
@@ -268,7 +290,7 @@ class March {
         const double h = b.t - a.t;
         if (count < 64 && h > 10 * resolution_ && h > 1e-14 * std::abs(b.t)) {
           ++counters_.line_splits;
-          pending[count] = evaluate(a.t + 0.5 * h);
+          pending[count] = evaluate_middle(a, b);
           ++count;
           continue;
         }
@@ -297,7 +319,13 @@ class March {
       p = evaluate(x);
       (p.f > 0 ? a : b) = x;
       const double step = -p.f / p.df;
-      if (b - a <= tolerance || (p.df < 0 && std::abs(step) <= tolerance)) break;
+      if (b - a <= tolerance) break;
+      if (p.df < 0 && std::abs(step) <= Path::kLastStep * step_ + tolerance) {
+        // Newton's error is the square of its step: nothing is left to evaluate.
+        p.t += step;
+        p.g += step * p.dg;
+        break;
+      }
       x = i < 40 && p.df < 0 ? x + step : 0.5 * (a + b);
     }
     line_.hit_t = p.t;
@@ -306,7 +334,7 @@ class March {
     line_.hit_mean = mean_.sample(p.t);
     line_.hit_sigma = sigma_.sample(p.t);
     line_.stretches.back().end = p.t;
-    line_.stretches.back().last_cell = cell_;
+    line_.stretches.back().last_cell = last_cell_;
     if (!(p.df < 0)) ++counters_.line_slope_floor;
   }
 
@@ -318,7 +346,7 @@ class March {
   const PlannedLine& plan_;
   Rng& rng_;
   Counters& counters_;
-  long cell_ = 0, tried_cell_ = -1;
+  long cell_ = 0, last_cell_ = 0, tried_cell_ = -1;  // the step's first and last cell
   double mean_slope_, sigma_slope_;  // upper bounds per t
   double piece_end_ = kInfinity;     // where the smooth piece of the fields ends
   double smooth_step_, mean_deviation_;

@@ -58,6 +58,12 @@ concept LinePath =
              Counters& counters, double& out) {
   { plan.correlation_error } -> std::convertible_to<double>;
   path.reset(plan, line, t, t, counters);
+  // Cells that one step of the march may cover, 1 or 2: where evaluations at the ends of cells are
+  // cheap, not more than the surface's distance asks for.
+  { Path::kStride } -> std::convertible_to<int>;
+  // The last Newton step towards a root that is not worth another evaluation, in cells: the square
+  // of it is left where g has two derivatives; 0 where it has not.
+  { Path::kLastStep } -> std::convertible_to<double>;
   // Length of a cell in t; infinite where g is constant on the line.
   { drawn.step() } -> std::same_as<double>;
   // Laws at the anchor, before the start: standard deviation of g, and mean (first out) and

@@ -8,6 +8,8 @@ namespace gpis {
 
 class ZeroPath {
  public:
+  static constexpr int kStride = 1;
+  static constexpr double kLastStep = 0;
   struct Plan {
     Plan(const GaussianProcess& process, const Box3&)
         : length(process.kernel->min_length_scale()) {}
