@@ -3,6 +3,7 @@
 #pragma once
 
 #include <boost/random/normal_distribution.hpp>
+#include <cstddef>
 #include <cstdint>
 
 namespace gpis {
@@ -45,6 +46,12 @@ class Rng {
   double positive_uniform() { return static_cast<double>(((*this)() >> 11) + 1) * 0x1p-53; }
   // Standard normal (Boost's ziggurat). The distribution keeps no state between calls.
   double normal() { return boost::random::normal_distribution<double>()(*this); }
+  // As many in a row: the state stays in registers.
+  [[gnu::flatten]] void normals(double* out, std::size_t count) {
+    Rng local = *this;
+    for (std::size_t i = 0; i < count; ++i) out[i] = local.normal();
+    *this = local;
+  }
 
  private:
   static std::uint64_t rotl(std::uint64_t x, int k) { return (x << k) | (x >> (64 - k)); }

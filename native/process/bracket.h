@@ -33,8 +33,9 @@ double cubic_root(const P& lo, const P& hi) {
     (f > 0 ? a : b) = s;
     double next = s - f / df;
     if (!(df < 0 && next > a && next < b)) next = 0.5 * (a + b);
-    if (std::abs(next - s) < 1e-7) break;
+    const bool near = std::abs(next - s) < 1e-4;
     s = next;
+    if (near) break;  // what follows is far below the cubic's own deviation
   }
   return lo.t + s * h;
 }

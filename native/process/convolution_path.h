@@ -67,10 +67,12 @@ class ConvolutionPath {
   void prepare(long cell, Rng& rng, Counters& counters) {
     const long first = cell - 7, last = cell + 8;
     if (runs_.empty() || first > end(runs_.back())) runs_.push_back({first, nodes_.size()});
-    for (long j = end(runs_.back()); j <= last; ++j) {
-      nodes_.push_back(rng.normal());
-      ++counters.line_normals;
-    }
+    const long missing = last + 1 - end(runs_.back());
+    if (missing <= 0) return;
+    counters.line_normals += missing;
+    const std::size_t drawn = nodes_.size();
+    nodes_.resize(drawn + missing);
+    rng.normals(nodes_.data() + drawn, missing);
   }
 
   // At the ends of a cell, q = kh and (k+1)h: fixed weights. The node at distance 4 is left out on

@@ -77,7 +77,8 @@ class March {
         enter(a, b);
         if (new_piece) from = combine(a, from.g, from.dg);  // same path, fields of the new piece
         to = evaluate_end(b);
-        if (find_root(from, to)) return line_.hit_t;
+        const Verdict verdict = classify_step(from, to);
+        if (verdict != Verdict::none && find_root(from, to, verdict)) return line_.hit_t;
         new_piece = kBreaks && b == piece_end_;
       }
       line_.stretches.back().end = b;
@@ -278,20 +279,21 @@ class March {
     return classify(a, b, path_.deviation(h) * sigma + mean_deviation_ * (h * h) * (h * h));
   }
 
-  bool find_root(const Point& from, const Point& to) {
+  // `verdict` is that of the whole step: none is left to the caller.
+  bool find_root(const Point& from, const Point& to, Verdict verdict) {
     std::array<Point, 64> pending;
     int count = 0;
     pending[count++] = to;
     Point a = from;
-    while (count > 0) {
+    for (;;) {
       const Point& b = pending[count - 1];
-      Verdict verdict = classify_step(a, b);
       if (verdict == Verdict::unclear) {
         const double h = b.t - a.t;
         if (count < 64 && h > 10 * resolution_ && h > 1e-14 * std::abs(b.t)) {
           ++counters_.line_splits;
           pending[count] = evaluate_middle(a, b);
           ++count;
+          verdict = classify_step(a, pending[count - 1]);
           continue;
         }
         ++counters_.line_split_limit;
@@ -302,9 +304,9 @@ class March {
         return true;
       }
       a = b;
-      --count;
+      if (--count == 0) return false;
+      verdict = classify_step(a, pending[count - 1]);
     }
-    return false;
   }
 
   // Newton inside a bracket f(lo) > 0 >= f(hi), first guess from the cubic; evaluates the path
@@ -347,8 +349,8 @@ class March {
   Rng& rng_;
   Counters& counters_;
   long cell_ = 0, last_cell_ = 0, tried_cell_ = -1;  // the step's first and last cell
-  double mean_slope_, sigma_slope_;  // upper bounds per t
-  double piece_end_ = kInfinity;     // where the smooth piece of the fields ends
+  double mean_slope_, sigma_slope_;                  // upper bounds per t
+  double piece_end_ = kInfinity;                     // where the smooth piece of the fields ends
   double smooth_step_, mean_deviation_;
   double step_ = 1, resolution_ = 0;  // of the path's cells, of a root
 };
