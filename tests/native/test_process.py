@@ -364,3 +364,26 @@ def test_where_mean_and_sigma_are_zero_there_is_no_surface(direction):
     hits = gn.first_hits(gp, [[0.1, 0.2, 0.0], [0.1, 0.2, -1.9 * direction]], [[0, 0, direction]] * 2, 10)
     np.testing.assert_allclose(hits["t"], [np.inf, 0.9], atol=1e-9)
     np.testing.assert_allclose(hits["gradient"][1], [0, 0, -direction], atol=1e-6)
+
+
+@pytest.mark.parametrize("memory", ["outside", "renewal+"])
+def test_roots_are_not_missed(memory, full_size, seed):
+    """Behind no hit's back: the path that a render took is nowhere inside before its hit, for all but 1e-3 of the rays."""
+    n = 200_000 if full_size else 20_000
+    rng = np.random.default_rng(seed)
+    gp = gn.GaussianProcess(gn.SphereField([0, 0, 0], 1), 0.05, gn.SquaredExponential(0.1))
+    origins = np.column_stack([rng.uniform(-1.1, 1.1, (n, 2)), np.full(n, 2.0)])
+    directions, state, t = np.tile([0.0, 0.0, -1.0], (n, 1)), None, np.arange(0.7, 3.3, 0.003)
+    if memory != "outside":  # rays that graze the surface they left
+        origins = origins / np.linalg.norm(origins, axis=1, keepdims=True)
+        directions = np.cross(origins, rng.normal(size=(n, 3))) + 0.1 * np.abs(rng.normal(size=(n, 1))) * origins
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        gradient = origins + 0.5 * rng.normal(size=(n, 3))
+        gradient *= np.sign(np.sum(gradient * directions, axis=1, keepdims=True))
+        state, t = {"value": np.zeros(n), "gradient": gradient}, np.arange(0.003, 1, 0.003)
+    options = {"start": state, "seed": seed}
+    hits = gn.first_hits(gp, origins, directions, t[-1], **options)
+    values = gn.line_values(gp, origins, directions, t, **options)
+    inside = np.nanmin(np.column_stack([values, np.ones(n)]), axis=1) < 0
+    assert np.isfinite(hits["t"]).mean() > 0.2
+    assert np.mean(inside) < 1e-3, f"{inside.sum()} of {n} rays passed through"
