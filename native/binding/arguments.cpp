@@ -21,8 +21,9 @@ Memory memory_argument(const std::string& value, const std::string& name) {
   if (value == "none") return Memory::none;
   if (value == "renewal") return Memory::renewal;
   if (value == "renewal+") return Memory::renewal_plus;
+  if (value == "global") return Memory::global;
   throw std::invalid_argument(name + " is '" + value +
-                              "', it takes 'none', 'renewal' or 'renewal+'.");
+                              "', it takes 'none', 'renewal', 'renewal+' or 'global'.");
 }
 
 std::string path_argument(const py::handle& value, const std::string& name) {

@@ -19,7 +19,7 @@ using NumberArray =
 // A field, or a number as a constant field. `name` says in the error whose argument it was.
 FieldPtr field_argument(const pybind11::handle& value, const std::string& name);
 
-// 'none', 'renewal' or 'renewal+'.
+// 'none', 'renewal', 'renewal+' or 'global'.
 Memory memory_argument(const std::string& value, const std::string& name);
 
 // An instance of a class of this module, never None: a null pointer in C++. `takes` is its name

@@ -62,12 +62,71 @@ Array sample(const GaussianProcess& gp, const py::object& at, py::ssize_t n, std
   return to_array(out);
 }
 
+// Now, in temporal length scales.
+std::optional<double> time_argument(const py::object& time_scale, double time) {
+  if (!std::isfinite(time))
+    throw std::invalid_argument("time must be finite, it is " + std::to_string(time) + ".");
+  if (time_scale.is_none()) {
+    if (time != 0) throw std::invalid_argument("time needs a time_scale.");
+    return std::nullopt;
+  }
+  const double scale = py::cast<double>(time_scale);
+  if (!(scale > 0) || !std::isfinite(scale))
+    throw std::invalid_argument("time_scale must be positive and finite, it is " +
+                                std::to_string(scale) + ".");
+  return time / scale;
+}
+
 Sampler sampler_argument(const std::string& name) {
   if (name == "auto") return Sampler::automatic;
   if (name == "convolution") return Sampler::convolution;
   if (name == "dense") return Sampler::dense;
+  if (name == "realisation") return Sampler::realisation;
   throw std::invalid_argument("sampler is '" + name +
-                              "', it takes 'auto', 'convolution' or 'dense'.");
+                              "', it takes 'auto', 'convolution', 'dense' or 'realisation'.");
+}
+
+// What rows have seen of their realisations, memory `global`: seed (N,), and where they were moved
+// outside, point (N, 3), value (N,), NaN where they were not.
+std::vector<RealisationMemory> realisations_argument(const py::handle& argument, std::size_t n) {
+  constexpr const char* sentence =
+      "start['realisation'] must be a dict of seed (N,), entry (N, 3) and shift (N,), as in the "
+      "state of earlier hits.";
+  if (!py::isinstance<py::dict>(argument)) throw std::invalid_argument(sentence);
+  const auto dict = py::reinterpret_borrow<py::dict>(argument);
+  for (const char* key : {"seed", "entry", "shift"})
+    if (!dict.contains(key) || py::len(dict) != 3) throw std::invalid_argument(sentence);
+  const auto seed =
+      py::array_t<std::uint64_t, py::array::c_style | py::array::forcecast>::ensure(dict["seed"]);
+  const Array entry = Array::ensure(dict["entry"]), shift = Array::ensure(dict["shift"]);
+  if (!seed || !entry || !shift || seed.ndim() != 1 || entry.ndim() != 2 || shift.ndim() != 1 ||
+      entry.shape(1) != 3 || static_cast<std::size_t>(seed.shape(0)) != n ||
+      static_cast<std::size_t>(entry.shape(0)) != n ||
+      static_cast<std::size_t>(shift.shape(0)) != n) {
+    PyErr_Clear();
+    throw std::invalid_argument(sentence);
+  }
+  std::vector<RealisationMemory> out(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    out[i].seed = seed.at(i);
+    if (std::isfinite(shift.at(i)))
+      out[i].entry = {true, {entry.at(i, 0), entry.at(i, 1), entry.at(i, 2)}, shift.at(i), {}};
+  }
+  return out;
+}
+
+py::dict realisations_dict(const std::vector<RealisationMemory>& realisations) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  const auto n = static_cast<py::ssize_t>(realisations.size());
+  py::array_t<std::uint64_t> seed(n);
+  Array entry({n, py::ssize_t{3}}), shift(n);
+  for (py::ssize_t i = 0; i < n; ++i) {
+    const RealisationMemory& r = realisations[i];
+    seed.mutable_at(i) = r.seed;
+    shift.mutable_at(i) = r.entry.active ? r.entry.value : nan;
+    for (int k = 0; k < 3; ++k) entry.mutable_at(i, k) = r.entry.active ? r.entry.at[k] : nan;
+  }
+  return py::dict("seed"_a = seed, "entry"_a = entry, "shift"_a = shift);
 }
 
 FirstHitsQuery query_argument(const py::object& origins, const py::object& directions, double t_max,
@@ -97,8 +156,9 @@ FirstHitsQuery query_argument(const py::object& origins, const py::object& direc
     const auto s = py::reinterpret_borrow<py::dict>(start);
     for (const auto& item : s) {
       const auto key = py::str(item.first).cast<std::string>();
-      if (key != "value" && key != "gradient")
-        throw std::invalid_argument("start: unknown key '" + key + "' (takes value, gradient).");
+      if (key != "value" && key != "gradient" && key != "realisation")
+        throw std::invalid_argument("start: unknown key '" + key +
+                                    "' (takes value, gradient, realisation).");
     }
     if (!s.contains("value") || !s.contains("gradient"))
       throw std::invalid_argument("start must hold value (N,) and gradient (N, 3).");
@@ -114,6 +174,8 @@ FirstHitsQuery query_argument(const py::object& origins, const py::object& direc
             "] must be 0 (on the surface) or positive (outside), and finite.");
       query.start.push_back({value.at(i), gradient[i]});
     }
+    if (s.contains("realisation"))
+      query.realisation = realisations_argument(s["realisation"], o.size());
   }
   query.t_max = t_max;
   query.first_index = first_index;
@@ -150,9 +212,10 @@ py::dict first_hits_dict(const py::object& gp, const py::object& origins,
       gradient.mutable_at(i, k) = hits.state[i].gradient[k];
     }
   }
+  py::dict state("value"_a = value, "gradient"_a = gradient);
+  if (!hits.realisation.empty()) state["realisation"] = realisations_dict(hits.realisation);
   return py::dict("t"_a = t, "position"_a = position, "gradient"_a = gradient, "part"_a = part,
-                  "state"_a = py::dict("value"_a = value, "gradient"_a = gradient),
-                  "counters"_a = counters_dict(hits.counters));
+                  "state"_a = state, "counters"_a = counters_dict(hits.counters));
 }
 
 Array line_values_array(const py::object& gp, const py::object& origins,
@@ -187,9 +250,11 @@ void bind_process(py::module_& m) {
       "negative.\n"
       "kernel: correlation of g. bounds: (min (3,), max (3,)); outside there is no surface. A mean "
       "on a grid bounds the\n"
-      "process to its nodes.")
+      "process to its nodes. time_scale, time: g also depends on time, with the correlation "
+      "exp(-Δ²/2) over Δ time\n"
+      "scales: realisations of the same seed flow from frame to frame (None: they stand still).")
       .def(py::init([](const py::object& mean, const py::object& sigma, const py::object& kernel,
-                       const py::object& bounds) {
+                       const py::object& bounds, const py::object& time_scale, double time) {
              auto gp = std::make_shared<GaussianProcess>();
              gp->mean = field_argument(mean, "mean");
              gp->sigma = field_argument(sigma, "sigma");
@@ -203,6 +268,7 @@ void bind_process(py::module_& m) {
                  if (!(corners[0][i] < corners[1][i]))
                    throw std::invalid_argument("bounds: min must be below max on every axis.");
              }
+             gp->time = time_argument(time_scale, time);
              if (gp->sigma->range().min < 0)
                throw std::invalid_argument("sigma must not be negative, it goes down to " +
                                            std::to_string(gp->sigma->range().min) +
@@ -210,7 +276,8 @@ void bind_process(py::module_& m) {
                                            "where a grid holds the variance.");
              return gp;
            }),
-           "mean"_a, "sigma"_a, "kernel"_a, py::kw_only(), "bounds"_a = py::none())
+           "mean"_a, "sigma"_a, "kernel"_a, py::kw_only(), "bounds"_a = py::none(),
+           "time_scale"_a = py::none(), "time"_a = 0.0)
       .def(
           "mean",
           [](const GaussianProcess& gp, const py::object& x) {
@@ -249,8 +316,9 @@ void bind_process(py::module_& m) {
         "origins, directions (N, 3), unit length. start: None (rays come from outside) or "
         "dict(value (N,), gradient (N, 3)):\n"
         "rays leave a point where f = value (0 on the surface), remembered as `memory` says "
-        "('none', 'renewal', 'renewal+').\n"
-        "sampler: 'auto', 'convolution' or 'dense'. tolerance: probability of a missed root per "
+        "('none', 'renewal', 'renewal+', 'global').\n"
+        "sampler: 'auto', 'convolution', 'dense' or 'realisation'. tolerance: probability of a "
+        "missed root per "
         "ray. Row i uses the random\n"
         "stream (seed, first_index + i), whatever the number of threads.");
   m.def("line_values", &line_values_array, "gp"_a, "origins"_a, "directions"_a, "t"_a,

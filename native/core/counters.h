@@ -23,6 +23,8 @@
   X(line_entry_inside, "lines found inside on re-entry after a skip")                        \
   X(line_slope_floor, "starts or hits whose slope had the wrong sign by rounding")           \
   X(line_split_limit, "steps no longer divided: narrower than the tolerance")                \
+  X(realisation_moved,                                                                       \
+    "rays that entered a kept realisation inside and were moved out for themselves alone")   \
   X(factorisations, "covariance matrices factorised")                                        \
   X(mean_lookups, "evaluations of a mean that is not constant")                              \
   X(sigma_lookups, "evaluations of a deviation that is not constant")                        \

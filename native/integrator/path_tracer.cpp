@@ -1,6 +1,7 @@
 #include "integrator/path_tracer.h"
 
 #include "integrator/scatter.h"
+#include "process/realisation_memory.h"
 #include "scene/scene_impl.h"
 
 namespace gpis {
@@ -39,7 +40,8 @@ struct PathTracer::Impl {
         lines(scene.stochastic.size()),
         met(scene.stochastic.size()),
         memory(scene.stochastic.size()),
-        shadow_memory(scene.stochastic.size()) {}
+        shadow_memory(scene.stochastic.size()),
+        realisations(scene.stochastic.size()) {}
 
   PathSample trace(const Ray& camera_ray, double t_max);
   bool closest(const Ray& ray, double t_max, Vertex& v);
@@ -66,6 +68,7 @@ struct PathTracer::Impl {
   std::vector<char> met;
   Line shadow_line;
   PathMemory memory, shadow_memory;
+  std::vector<RealisationMemory> realisations;  // that the path sees, of memory `global`
   const BlockPoints* points = nullptr;
   int bounce = 0;
   Rng* rng = nullptr;
@@ -91,7 +94,10 @@ PathSample PathTracer::Impl::trace(const Ray& camera_ray, double t_max) {
   Ray ray = camera_ray;
   Color throughput{1, 1, 1};
   double scatter_pdf = kInfinity;
-  for (auto& state : memory) state.reset();
+  for (std::size_t i = 0; i < memory.size(); ++i) {
+    memory[i].reset();
+    if (scene.stochastic[i].surface.memory() == Memory::global) realisations[i] = {(*rng)(), {}};
+  }
 
   for (bounce = 0;; ++bounce) {
     Vertex v;
@@ -152,7 +158,7 @@ bool PathTracer::Impl::closest(const Ray& ray, double t_max, Vertex& v) {
     const auto [enter, leave] = clip(surface.bounds(), ray.origin, ray.direction, 0, nearest);
     met[i] = enter <= leave;
     if (!met[i]) continue;
-    const Start start = surface.start_from(memory[i] ? &*memory[i] : nullptr);
+    const Start start = surface.start_from(memory[i] ? &*memory[i] : nullptr, &realisations[i]);
     const double t = surface.first_hit(lines[i], ray, nearest, start, *rng, *counters);
     if (t >= nearest) continue;
     nearest = t;
@@ -188,7 +194,7 @@ void PathTracer::Impl::remember_others(const Vertex& v) {
       ++counters->states_inside;
       continue;
     }
-    const Vec3 gradient = surface.memory() == Memory::renewal_plus
+    const Vec3 gradient = surface.memory() != Memory::renewal
                               ? draw(surface.gradient_law(lines[i], v.t, *rng))
                               : Vec3{};
     memory[i] = surface.state(value, gradient);
@@ -203,7 +209,9 @@ bool PathTracer::Impl::visible(const Ray& ray, double distance) {
     const ProcessSurface& surface = scene.stochastic[i].surface;
     const auto [enter, leave] = clip(surface.bounds(), ray.origin, ray.direction, 0, distance);
     if (enter > leave) continue;
-    const Start start = surface.start_from(shadow_memory[i] ? &*shadow_memory[i] : nullptr);
+    RealisationMemory realisation = realisations[i];
+    const Start start =
+        surface.start_from(shadow_memory[i] ? &*shadow_memory[i] : nullptr, &realisation);
     if (surface.first_hit(shadow_line, ray, distance, start, light_rng, *counters) < distance)
       return false;
   }

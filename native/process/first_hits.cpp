@@ -10,7 +10,8 @@ namespace {
 
 // Calls visit(row, line, t, rng, counters) for every ray, in parallel.
 template <class Visit>
-Counters for_each_hit(const ProcessSurface& surface, const FirstHitsQuery& query, Visit visit) {
+Counters for_each_hit(const ProcessSurface& surface, const FirstHitsQuery& query,
+                      std::vector<RealisationMemory>& realisations, Visit visit) {
   struct Worker {
     Line line;
     Counters counters;
@@ -23,7 +24,14 @@ Counters for_each_hit(const ProcessSurface& surface, const FirstHitsQuery& query
           Worker& worker = workers.local();
           for (std::size_t i = range.begin(); i != range.end(); ++i) {
             Rng rng(query.seed, query.first_index + i);
-            const Start start = query.start.empty() ? Start{} : surface.start_from(&query.start[i]);
+            RealisationMemory fresh;
+            RealisationMemory* realisation = nullptr;
+            if (surface.memory() == Memory::global) {
+              realisation = realisations.empty() ? &fresh : &realisations[i];
+              if (query.realisation.empty()) realisation->seed = rng();
+            }
+            const Start start =
+                surface.start_from(query.start.empty() ? nullptr : &query.start[i], realisation);
             const double t = surface.first_hit(worker.line, query.rays[i], query.t_max, start, rng,
                                                worker.counters);
             visit(i, worker.line, t, rng, worker.counters);
@@ -42,8 +50,11 @@ FirstHits first_hits(const ProcessSurface& surface, const FirstHitsQuery& query)
   FirstHits result;
   result.t.resize(query.rays.size());
   result.state.resize(query.rays.size());
+  result.realisation = query.realisation;
+  if (surface.memory() == Memory::global) result.realisation.resize(query.rays.size());
   result.counters = for_each_hit(
-      surface, query, [&](std::size_t i, Line& line, double t, Rng& rng, Counters& counters) {
+      surface, query, result.realisation,
+      [&](std::size_t i, Line& line, double t, Rng& rng, Counters& counters) {
         result.t[i] = t;
         if (std::isinf(t)) {
           result.state[i] = {nan, {nan, nan, nan}};
@@ -59,10 +70,13 @@ std::vector<double> line_values(const ProcessSurface& surface, const FirstHitsQu
                                 const std::vector<double>& t) {
   std::vector<double> values(query.rays.size() * t.size(),
                              std::numeric_limits<double>::quiet_NaN());
-  for_each_hit(surface, query, [&](std::size_t i, Line& line, double, Rng& rng, Counters&) {
-    for (std::size_t j = 0; j < t.size(); ++j)
-      if (surface.sampled_at(line, t[j])) values[i * t.size() + j] = surface.value(line, t[j], rng);
-  });
+  std::vector<RealisationMemory> realisations = query.realisation;
+  for_each_hit(surface, query, realisations,
+               [&](std::size_t i, Line& line, double, Rng& rng, Counters&) {
+                 for (std::size_t j = 0; j < t.size(); ++j)
+                   if (surface.sampled_at(line, t[j]))
+                     values[i * t.size() + j] = surface.value(line, t[j], rng);
+               });
   return values;
 }
 

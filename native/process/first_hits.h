@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/counters.h"
+#include "process/realisation_memory.h"
 #include "process/surface.h"
 
 namespace gpis {
@@ -15,6 +16,7 @@ struct FirstHitsQuery {
   double t_max = kInfinity;
   std::vector<State>
       start;  // one a ray: rays that leave a surface point; empty: rays that come from outside
+  std::vector<RealisationMemory> realisation;  // one a row, of memory `global`; empty: fresh ones
   std::uint64_t seed = 0, first_index = 0;  // row i uses the random stream (seed, first_index + i)
   int threads = 0;                          // 0 = all cores
 };
@@ -22,6 +24,7 @@ struct FirstHitsQuery {
 struct FirstHits {
   std::vector<double> t;     // infinity where there is none
   std::vector<State> state;  // value 0 and a gradient drawn from its law; NaN where there is no hit
+  std::vector<RealisationMemory> realisation;  // that each row has seen; memory `global` alone
   Counters counters;
 };
 

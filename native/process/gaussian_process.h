@@ -15,10 +15,14 @@ struct GaussianProcess {
   FieldPtr sigma;  // standard deviation, never variance
   KernelPtr kernel;
   std::optional<Box3> bounds;  // outside there is no surface
+  // Now, in temporal length scales: realisations of one seed at two times are correlated as
+  // exp(-Δ²/2). None: the process does not change with time.
+  std::optional<double> time;
 };
 
-// What a ray that leaves a surface point remembers of the process (definitions B1-B3).
-enum class Memory { none, renewal, renewal_plus };
-enum class Sampler { automatic, convolution, dense };
+// What a ray that leaves a surface point remembers of the process (definitions B1-B4); `global`: a
+// path sees one realisation.
+enum class Memory { none, renewal, renewal_plus, global };
+enum class Sampler { automatic, convolution, dense, realisation };
 
 }  // namespace gpis

@@ -174,12 +174,8 @@ void LatticeField::add_line(LatticeNoise& noise, const Vec3& x, double spacing, 
 }
 
 double LatticeField::fourth_derivative_variance(const Vec3& d) const {
-  // E ω⁸ of a normal frequency of mean m = k·d and variance v = |Bd|² (105 v⁴ without modulation).
   const Vec3 whitened = whitening_ * d;
-  const double v = dot(whitened, whitened), k = dot(wave_vector_, d), m = k * k;
-  return scale_ * scale_ *
-         (m * m * m * m + 28 * m * m * m * v + 210 * m * m * v * v + 420 * m * v * v * v +
-          105 * v * v * v * v);
+  return scale_ * scale_ * eighth_moment(dot(wave_vector_, d), dot(whitened, whitened));
 }
 
 }  // namespace gpis

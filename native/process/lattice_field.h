@@ -10,6 +10,12 @@
 
 namespace gpis {
 
+// E ω⁸ of a normal frequency of mean m and variance v.
+inline double eighth_moment(double m, double v) {
+  const double m2 = m * m;
+  return m2 * (m2 * (m2 * (m2 + 28 * v) + 210 * v * v) + 420 * v * v * v) + 105 * v * v * v * v;
+}
+
 // One field of unit variance on one lattice.
 class Lattice {
  public:

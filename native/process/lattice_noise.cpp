@@ -29,7 +29,7 @@ TimeWindow::TimeWindow(double time) {
 void LatticeNoise::draw(std::uint64_t key, int count, double* out) {
   if (!time_) {
     Rng rng(key, 0);
-    for (int i = 0; i < count; ++i) out[i] = rng.normal();
+    rng.normals(out, count);
     drawn_ += count;
     return;
   }

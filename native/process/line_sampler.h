@@ -27,5 +27,6 @@ class LineSampler {
 std::unique_ptr<LineSampler> make_zero(const GaussianProcess& process, const Box3& bounds);
 std::unique_ptr<LineSampler> make_convolution(const GaussianProcess& process, const Box3& bounds);
 std::unique_ptr<LineSampler> make_dense(const GaussianProcess& process, const Box3& bounds);
+std::unique_ptr<LineSampler> make_realisation(const GaussianProcess& process, const Box3& bounds);
 
 }  // namespace gpis

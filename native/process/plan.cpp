@@ -5,6 +5,7 @@
 #include "field/scaled_field.h"
 #include "kernel/scaled_kernel.h"
 #include "process/gaussian_process.h"
+#include "process/realisation.h"
 
 namespace gpis {
 namespace {
@@ -83,6 +84,10 @@ PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Sampler sa
   } else if (sampler == Sampler::dense) {
     plan.line_sampler = make_dense(*process, plan.bounds);
     plan.sampler_reason = "dense: asked for";
+  } else if (sampler == Sampler::realisation) {
+    plan.line_sampler = make_realisation(*process, plan.bounds);
+    plan.sampler_reason =
+        "realisation: " + Realisation(*process->kernel, Realisation::Access::rays).describe();
   } else {
     plan.line_sampler = make_convolution(*process, plan.bounds);
     plan.sampler_reason = sampler == Sampler::convolution

@@ -49,6 +49,10 @@ Realisation::Realisation(const Kernel& kernel, Access access)
 }
 
 void Realisation::draw(std::uint64_t seed, std::optional<double> time) {
+  if (drawn_ && seed == seed_ && time == time_) return;  // the bricks in the cache are still good
+  drawn_ = true;
+  seed_ = seed;
+  time_ = time;
   noise_.reset(seed, time);
   for (SpectralField& field : spectra_) spectral_normals_ += field.draw(seed, time);
 }
@@ -80,6 +84,14 @@ double Realisation::fourth_derivative() const {
   for (const LatticeField& field : lattices_)
     variance += field.fourth_derivative_variance(direction_);
   for (const SpectralField& field : spectra_) variance += field.fourth_derivative_variance();
+  return std::sqrt(variance);
+}
+
+double Realisation::expected_fourth_derivative(const Vec3& d) const {
+  double variance = 0;
+  for (const LatticeField& field : lattices_) variance += field.fourth_derivative_variance(d);
+  for (const SpectralField& field : spectra_)
+    variance += field.expected_fourth_derivative_variance(d);
   return std::sqrt(variance);
 }
 

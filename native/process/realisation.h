@@ -27,8 +27,10 @@ class Realisation {
   // The restriction to o + t d: values, and slopes per t.
   void set_line(const Vec3& o, const Vec3& d);
   void on_line(double t, double& g, double& dg);
-  // Standard deviation of the fourth derivative along the line.
+  // Standard deviation of the fourth derivative along the line; and about what it is along any
+  // line of direction d, whatever the seed.
   double fourth_derivative() const;
+  double expected_fourth_derivative(const Vec3& d) const;
 
   // Values at origin + (i, j, k)·spacing, 0 <= i, j, k < size; g[(i·J + j)·K + k].
   void fill(const Vec3& origin, double spacing, const std::array<int, 3>& size, float* g);
@@ -42,7 +44,9 @@ class Realisation {
   std::vector<LatticeField> lattices_;
   std::vector<SpectralField> spectra_;
   LatticeNoise noise_;
-  std::uint64_t spectral_normals_ = 0;
+  std::uint64_t seed_ = 0, spectral_normals_ = 0;
+  std::optional<double> time_;
+  bool drawn_ = false;
   Vec3 origin_, direction_;
   std::vector<double> row_;
 };

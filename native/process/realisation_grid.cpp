@@ -52,7 +52,7 @@ std::optional<RealisationGrid> realise(const GaussianProcess& process,
   };
   tbb::enumerable_thread_specific<Worker> workers([&] {
     Worker worker{Realisation(*process.kernel, Realisation::Access::rows), {}};
-    worker.realisation.draw(query.seed, std::nullopt);
+    worker.realisation.draw(query.seed, process.time);
     return worker;
   });
   const auto fill = [&](int tile) {
@@ -89,7 +89,7 @@ std::vector<FieldSample> realise_at(const GaussianProcess& process, const std::v
   tbb::task_arena(arena_of(threads)).execute([&] {
     tbb::parallel_for(0, count, [&](int n) {
       Realisation& realisation = workers.local();
-      realisation.draw(seed + n, std::nullopt);
+      realisation.draw(seed + n, process.time);
       for (std::size_t i = 0; i < points.size(); ++i) {
         const FieldSample mean = process.mean->sample(points[i]),
                           sigma = process.sigma->sample(points[i]),

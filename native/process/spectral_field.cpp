@@ -3,7 +3,7 @@
 #include <boost/random/gamma_distribution.hpp>
 #include <stdexcept>
 
-#include "process/lattice_noise.h"
+#include "process/lattice_field.h"
 
 namespace gpis {
 namespace {
@@ -130,6 +130,13 @@ double SpectralField::fourth_derivative_variance() const {
   // The amplitudes' own squares in place of their expectations: a path differs from its cubic by
   // what it is, not by what it is on average.
   return 0.5 * ((a_.square() + b_.square()) * along_.square().square().square()).sum();
+}
+
+double SpectralField::expected_fourth_derivative_variance(const Vec3& d) const {
+  // As a squared exponential of half the length scale: 1024 features of Matérn 3/2 come to that.
+  const Vec3 whitened = term_.whitening * d;
+  return term_.weight * eighth_moment(dot(term_.wave_vector, d),
+                                      4 * term_.radial.lambda2() * dot(whitened, whitened));
 }
 
 void SpectralField::add_slice(const Vec3& origin, double spacing, int rows, int count, float* g) {

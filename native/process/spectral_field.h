@@ -36,8 +36,10 @@ class SpectralField {
   // g along o + t d, values and slopes per t.
   void set_line(const Vec3& o, const Vec3& d);
   void add_on_line(double t, double& g, double& dg);
-  // Variance of the fourth derivative along the line, given the frequencies.
+  // Variance of the fourth derivative along the line, given the frequencies; and about what it is
+  // before they are drawn (its expectation is infinite for some spectra).
   double fourth_derivative_variance() const;
+  double expected_fourth_derivative_variance(const Vec3& d) const;
 
   // Adds to g[j·count + k] the values at origin + (0, j, k)·spacing, j < rows, k < count.
   void add_slice(const Vec3& origin, double spacing, int rows, int count, float* g);

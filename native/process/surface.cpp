@@ -5,6 +5,7 @@
 
 #include "process/line_impl.h"
 #include "process/plan.h"
+#include "process/realisation_path.h"
 
 namespace gpis {
 
@@ -13,12 +14,26 @@ Line::~Line() = default;
 Line::Line(Line&&) noexcept = default;
 Line& Line::operator=(Line&&) noexcept = default;
 
+namespace {
+
+Sampler sampler_for(Memory memory, Sampler sampler) {
+  if (memory != Memory::global) return sampler;
+  if (sampler != Sampler::automatic && sampler != Sampler::realisation)
+    throw std::invalid_argument(
+        "memory 'global' is one realisation for the whole path: it takes sampler 'auto' or "
+        "'realisation'.");
+  return Sampler::realisation;
+}
+
+}  // namespace
+
 ProcessSurface::ProcessSurface(std::shared_ptr<const GaussianProcess> process,
                                const Affine& object_to_world, Memory memory, Sampler sampler,
                                double missed_root)
     : object_to_world_(object_to_world),
       memory_(memory),
-      planned_(std::make_shared<PlannedLine>(plan_line(std::move(process), sampler, missed_root))) {
+      planned_(std::make_shared<PlannedLine>(
+          plan_line(std::move(process), sampler_for(memory, sampler), missed_root))) {
   const double volume = determinant(object_to_world.linear);
   if (!std::isfinite(volume) || std::abs(volume) < 1e-300)
     throw std::invalid_argument(
@@ -50,7 +65,11 @@ double ProcessSurface::first_hit(Line& line, const Ray& ray, double t_max, const
     ++counters.line_skipped;
     return kInfinity;
   }
-  return planned_->line_sampler->first_hit(*planned_, l, t_begin, t_end, start, rng, counters);
+  if (memory_ == Memory::global) l.path<RealisationPath>().keep(start.realisation);
+  const double t =
+      planned_->line_sampler->first_hit(*planned_, l, t_begin, t_end, start, rng, counters);
+  if (memory_ == Memory::global) l.path<RealisationPath>().keep(nullptr);
+  return t;
 }
 
 bool ProcessSurface::sampled_at(const Line& line, double t) const {
@@ -107,11 +126,12 @@ Vec3 ProcessSurface::world_gradient(const State& state) const {
   return transpose(world_to_object_.linear) * state.gradient;
 }
 
-Start ProcessSurface::start_from(const State* remembered) const {
-  if (!remembered) return {};
+Start ProcessSurface::start_from(const State* remembered, RealisationMemory* realisation) const {
+  if (!remembered) return {Start::Kind::outside, {}, realisation};
   // A certain surface has nothing to forget (B2): the ray starts on it and leaves along its
   // gradient.
-  if (planned_->sigma_max == 0) return {Start::Kind::value_slope, *remembered};
+  if (planned_->sigma_max == 0 || memory_ == Memory::global)
+    return {Start::Kind::value_slope, *remembered, realisation};
   if (memory_ == Memory::none) return {};
   if (memory_ == Memory::renewal) return {Start::Kind::value, *remembered};
   return {Start::Kind::value_slope, *remembered};
@@ -123,16 +143,24 @@ std::vector<std::pair<std::string, std::string>> ProcessSurface::plan() const {
     text << v;
     return text.str();
   };
-  const char* memories[] = {"none", "renewal", "renewal+"};
+  const char* memories[] = {"none", "renewal", "renewal+",
+                            "global: one realisation for the whole path and its shadow rays"};
   const Range sigma = planned_->process->sigma->range();
-  return {{"sampler", planned_->sampler_reason},
-          {"memory", memories[static_cast<int>(memory_)]},
-          {"sigma", sigma.min == sigma.max
-                        ? "constant " + number(sigma.min)
-                        : "varies, " + number(sigma.min) + " to " + number(sigma.max)},
-          {"certainly_absent", "where the mean exceeds " + number(planned_->skip_threshold) + " (" +
-                                   number(planned_->skip_deviations) +
-                                   " standard deviations): nothing is drawn"}};
+  std::vector<std::pair<std::string, std::string>> rows{
+      {"sampler", planned_->sampler_reason},
+      {"memory", memories[static_cast<int>(memory_)]},
+      {"sigma", sigma.min == sigma.max
+                    ? "constant " + number(sigma.min)
+                    : "varies, " + number(sigma.min) + " to " + number(sigma.max)},
+      {"certainly_absent", "where the mean exceeds " + number(planned_->skip_threshold) + " (" +
+                               number(planned_->skip_deviations) +
+                               " standard deviations): nothing is drawn"}};
+  if (planned_->process->time)
+    rows.push_back({"time", "now " + number(*planned_->process->time) +
+                                " time scales: a realisation (memory global, gp.realisation) flows "
+                                "from frame to frame under one seed; the other memories draw "
+                                "every path anew, whose expectation does not change with time"});
+  return rows;
 }
 
 }  // namespace gpis

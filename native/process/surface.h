@@ -14,6 +14,7 @@
 
 namespace gpis {
 
+struct RealisationMemory;
 struct PlannedLine;  // tables and function pointers chosen once per object (process/plan.h)
 
 // f and ∇f (object space) at a point: what Renewal+ remembers. Renewal uses the value alone.
@@ -32,6 +33,9 @@ struct Start {
   };
   Kind kind = Kind::outside;
   State state;
+  // The realisation that the ray is to see; null: a fresh path. Memory `global` alone, which takes
+  // note here where the path entered it.
+  RealisationMemory* realisation = nullptr;
 };
 
 // Gradient at a point of a line, given the line sample (t, ∂_d f): ∇f = mean + ξ₁ b1 + ξ₂ b2, ξ iid
@@ -97,7 +101,7 @@ class ProcessSurface {
 
   // The start of a ray that leaves a point with this remembered state, under this object's memory
   // model.
-  Start start_from(const State* remembered) const;
+  Start start_from(const State* remembered, RealisationMemory* realisation = nullptr) const;
 
   // Human-readable facts for scene.plan().
   std::vector<std::pair<std::string, std::string>> plan() const;

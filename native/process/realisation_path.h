@@ -1,0 +1,74 @@
+// Sampler 6 on a line: the values of one realisation of g in all of space (process/realisation.h),
+// a fresh one for every line, or one that a light path keeps (memory `global`). Slow, and the
+// ground truth for the samplers that know the line alone.
+#pragma once
+
+#include "process/gaussian_process.h"
+#include "process/path.h"
+#include "process/realisation.h"
+#include "process/realisation_memory.h"
+
+namespace gpis {
+
+class RealisationPath {
+ public:
+  static constexpr int kStride = 1;
+  static constexpr double kLastStep = 1e-5;
+
+  struct Plan {
+    Plan(const GaussianProcess& process, const Box3& bounds);
+    // Of lattices; spectral features have the exact covariance.
+    double correlation_error = 3e-7;
+    KernelPtr kernel;
+    std::optional<double> time;
+    double variance;
+    Mat3 derivative_covariance, inverse_derivative_covariance;
+    std::string description;
+  };
+
+  // The lines from here on are drawn from this realisation; null: from a fresh one each.
+  void keep(RealisationMemory* kept) { kept_ = kept; }
+
+  void reset(const Plan& plan, const LineGeometry& line, double anchor, double t_end,
+             Counters& counters);
+  double step() const { return step_; }
+  double value_deviation() const { return std::sqrt(plan_->variance); }
+  void slope_law(double, double& mean, double& deviation) const;
+  void start_free(Rng& rng, Counters& counters, double& g, double& dg);
+  double start(const PathStart& known, Rng& rng, Counters& counters);
+  double pull(double) const { return pull_; }
+  void prepare(long, Rng&, Counters& counters) { count(counters); }
+  void at_left(long cell, double& g, double& dg) { evaluate(anchor_ + cell * step_, g, dg); }
+  void at_right(long cell, double& g, double& dg) { evaluate(anchor_ + (cell + 1) * step_, g, dg); }
+  void at(long, double t, Rng&, double& g, double& dg) { evaluate(t, g, dg); }
+  double deviation(double h) const { return deviation_ * (h * h) * (h * h); }
+  PathGradient gradient(double t, double g, double dg, Rng& rng);
+
+ private:
+  struct Pool {
+    const Plan* plan;
+    std::unique_ptr<Realisation> realisation;
+  };
+
+  void draw(Rng& rng, Counters& counters);
+  FieldSample sample(const Vec3& x) const;
+  void count(Counters& counters);
+  RealisationCondition condition(const PathStart& known) const;
+  void evaluate(double t, double& g, double& dg);
+  Vec3 point(double t) const { return line_.origin + line_.direction * t; }
+
+  const Plan* plan_ = nullptr;
+  std::vector<Pool> pool_;  // one for each object that this line was used for
+  Realisation* realisation_ = nullptr;
+  RealisationMemory* kept_ = nullptr;
+  LineGeometry line_;
+  double anchor_ = 0, step_ = 1, deviation_ = 0, pull_ = 0;
+  bool drawn_ = false;
+  std::uint64_t counted_ = 0;
+
+  RealisationCondition entry_, own_;  // of the realisation that is kept, and of this line alone
+};
+
+static_assert(LinePath<RealisationPath>);
+
+}  // namespace gpis
