@@ -71,7 +71,8 @@ def test_alone():
 
 def test_with_the_embree_of_bpy_preloaded(bpy_folder):
     (library,) = bpy_folder.glob("lib/libembree4.so.4")
-    run("", LD_PRELOAD=str(library))
+    before = os.environ.get("LD_PRELOAD", "")  # a sanitizer, which must come first
+    run("", LD_PRELOAD=f"{before} {library}".strip())
 
 
 def test_after_bpy(bpy_folder):
