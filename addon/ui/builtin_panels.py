@@ -33,7 +33,10 @@ def _panels():
         engines = getattr(panel, "COMPAT_ENGINES", None)
         if engines is None:
             continue
-        if panel.__name__ in _ADDED or ("BLENDER_RENDER" in engines and panel.__name__ not in _EXCLUDED):
+        name = panel.__name__
+        # Freestyle draws its strokes as meshes with nodes that this engine does not read.
+        fits = "BLENDER_RENDER" in engines and name not in _EXCLUDED and "freestyle" not in name
+        if name in _ADDED or fits:
             yield panel
 
 

@@ -62,7 +62,8 @@ def test_builtin_panels_serve_the_engine(extension):
     panels = {panel.__name__: panel for panel in bpy.types.Panel.__subclasses__()}
     for name in ("RENDER_PT_format", "DATA_PT_lens", "EEVEE_MATERIAL_PT_surface", "EEVEE_WORLD_PT_surface"):
         assert "GPIS" in panels[name].COMPAT_ENGINES, name
-    assert "GPIS" not in panels["VIEWLAYER_PT_layer_passes"].COMPAT_ENGINES
+    for name in ("VIEWLAYER_PT_layer_passes", "RENDER_PT_freestyle", "VIEWLAYER_PT_freestyle_lineset"):
+        assert "GPIS" not in panels[name].COMPAT_ENGINES, name
 
 
 def test_native_module_is_not_loaded_before_it_is_needed(fresh_blender, extension_zip):
