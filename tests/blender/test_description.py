@@ -157,3 +157,14 @@ def test_world_lengths_follow_scale_and_units(stage, extension):
     assert panel.world_lengths(matrix, 0.5) == pytest.approx((0.5, 1.0, 1.5))
     stage.unit_settings.system, stage.unit_settings.scale_length = "METRIC", 0.01
     assert panel._length(SimpleNamespace(scene=stage), 2.0) == "2 cm"
+
+
+def test_an_instancer_that_is_not_shown_is_left_out(stage, describe):
+    crowd = support.cube(stage, "Crowd")
+    support.cube(stage, "Member", size=0.1).parent = crowd
+    crowd.instance_type = "VERTS"
+    names = [entry["name"] for entry in describe()["objects"]]
+    assert names.count("Crowd") == 1 and names.count("Member") >= 8
+    crowd.show_instancer_for_render = crowd.show_instancer_for_viewport = False
+    names = [entry["name"] for entry in describe()["objects"]]
+    assert names.count("Crowd") == 0 and names.count("Member") >= 8
