@@ -18,8 +18,9 @@ MATERIALS = {
         {"Base_Color": (0.9, 0.6, 0.3, 1), "Roughness": 0.4, "Metallic": 1.0},
     ),
 }
-# Cycles scales Principled's diffuse part by the albedo of the lobes above it; ours is one diffuse and one GGX lobe.
-SYSTEMATIC = {"principled dull": 0.05, "principled": 0.05}
+# Cycles scales Principled's diffuse part by the albedo of the lobes above it; ours is one diffuse and one GGX lobe:
+# 5.5 % at the most, at 512 samples of both.
+SYSTEMATIC = {"principled dull": 0.06, "principled": 0.06}
 
 
 @pytest.fixture

@@ -44,6 +44,7 @@ def test_passes(stage, tmp_path):
     assert np.all(ours[prefix + "Sample Count.X"] == 32)
     depth, true = ours[prefix + "Depth.Z"], cycles[prefix + "Depth.Z"]
     assert np.mean((depth >= 1e10) != (true >= 1e10)) < 0.03, "only at edges, where a pixel has both"
+    assert np.isfinite(depth).all(), "a miss is a number in Blender's depth"
     inner = (true < 1e10) & (depth < 1e10) & _inner(true)
     assert inner.mean() > 0.3
     assert np.abs(depth / true - 1)[inner].max() < 0.02
