@@ -65,7 +65,8 @@ def render_frame(engine, depsgraph):
         engine.report({"WARNING"}, sentence)
     try:
         native_scene = renderer.Scene(state.description)
-        session = Session(renderer, native_scene, width, height, limits)
+        watched = not bpy.app.background and not engine.is_animation
+        session = Session(renderer, native_scene, width, height, limits, watched)
         passes.add(engine, view_layer)
         result = _run(engine, session, view_layer, width, height)
     except (ValueError, OSError) as error:

@@ -133,6 +133,7 @@ class Session:
     width: int
     height: int
     limits: Limits
+    sketches: bool = True  # False where nobody waits for a picture
     stop: str = field(default="", init=False)  # what ended it
     history: list = field(default_factory=list, init=False)  # one dict a round: seconds, samples, estimated_error
 
@@ -213,7 +214,7 @@ class Session:
         )
 
     def _rounds(self):
-        if not self._sketch():
+        if self.sketches and not self._sketch():
             return
         whole = None  # of the rounds that are complete
         samples, error = 0, None

@@ -117,6 +117,14 @@ def test_sketches_are_shown_and_thrown_away(session, monkeypatch):
     assert {1, 4, 16} <= pictures and fractions == sorted(fractions)
 
 
+def test_no_sketches_where_nobody_looks(session):
+    renderer = Counting()
+    running = session.Session(renderer, None, 10_000, 10_000, session.Limits(samples=32), False)
+    running.start()
+    running.finish()
+    assert renderer.calls == [(0, 16), (16, 16)]
+
+
 def test_cancel_in_the_first_block_keeps_the_sketch(session, monkeypatch):
     monkeypatch.setattr(session, "PATIENCE", 0.02)
     renderer = Counting(pace=0.01)
