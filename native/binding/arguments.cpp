@@ -2,19 +2,19 @@
 
 #include <filesystem>
 
+#include "binding/reader.h"
 #include "field/constant_field.h"
 
 namespace gpis {
-namespace py = pybind11;
 
 FieldPtr field_argument(const py::handle& value, const std::string& name) {
   if (py::isinstance<Field>(value)) return value.cast<std::shared_ptr<Field>>();
-  if (PyFloat_Check(value.ptr()) || PyLong_Check(value.ptr()) || PyIndex_Check(value.ptr()) ||
-      py::hasattr(value, "__float__"))
-    return std::make_shared<ConstantField>(py::float_(py::reinterpret_borrow<py::object>(value)));
-  throw std::invalid_argument(
-      name + " must be a field or a number, it is a " +
-      py::str(py::type::handle_of(value).attr("__name__")).cast<std::string>() + ".");
+  if (PyNumber_Check(value.ptr())) {
+    const auto number = py::reinterpret_steal<py::object>(PyNumber_Float(value.ptr()));
+    if (number) return std::make_shared<ConstantField>(number.cast<double>());
+    PyErr_Clear();
+  }
+  throw std::invalid_argument(name + " must be a field or a number, it is " + shown(value) + ".");
 }
 
 Memory memory_argument(const std::string& value, const std::string& name) {

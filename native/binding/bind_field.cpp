@@ -152,7 +152,7 @@ py::object support_of(const Field& field) {
 }
 
 void bind_line(py::module_& m) {
-  py::class_<FieldLine>(
+  py::class_<FieldLine, std::shared_ptr<FieldLine>>(
       m, "FieldLine", R"(A field along the ray o + t d, smooth on pieces: what the ray marchers use.
 
 Visit the pieces in order: b = next_break(a); enter(a, b); then evaluate and sample belong to that piece, ends included.)")
@@ -218,13 +218,15 @@ field(points (N, 3)) -> (N,); field.gradient(points) -> (N, 3). Fields add to fi
           "sheared is continued by its nearest value. ValueError if the matrix is singular.")
       .def(
           "line",
-          [](const Field& f, const Triple& o, const Triple& d) {
+          [](const SharedField& f, const Triple& o, const Triple& d) {
             if (!(length(to_vec(d)) > 0) || !is_finite(to_vec(d)) || !is_finite(to_vec(o)))
-              refuse("line: the ray is ", to_vec(o), " + t ", to_vec(d),
+              refuse("line: origin + t direction is ", to_vec(o), " + t ", to_vec(d),
                      "; it takes finite numbers and a direction of non-zero length.");
-            return f.line(to_vec(o), to_vec(d));
+            // Not py::keep_alive, which crashes (pybind11 3.1.0) where an argument is wrong.
+            return std::shared_ptr<FieldLine>(f->line(to_vec(o), to_vec(d)).release(),
+                                              [f](FieldLine* line) { delete line; });
           },
-          "origin"_a, "direction"_a, py::keep_alive<0, 1>(),
+          "origin"_a, "direction"_a,
           "The field along origin + t direction (not normalised), as a FieldLine.")
       .def_property_readonly(
           "range", [](const Field& f) { return std::pair(f.range().min, f.range().max); },

@@ -63,18 +63,17 @@ Array sample(const GaussianProcess& gp, const py::object& at, py::ssize_t n, std
 }
 
 // Now, in temporal length scales.
-std::optional<double> time_argument(const py::object& time_scale, double time) {
+std::optional<double> time_argument(std::optional<double> time_scale, double time) {
   if (!std::isfinite(time))
     throw std::invalid_argument("time must be finite, it is " + std::to_string(time) + ".");
-  if (time_scale.is_none()) {
+  if (!time_scale) {
     if (time != 0) throw std::invalid_argument("time needs a time_scale.");
     return std::nullopt;
   }
-  const double scale = py::cast<double>(time_scale);
-  if (!(scale > 0) || !std::isfinite(scale))
+  if (!(*time_scale > 0) || !std::isfinite(*time_scale))
     throw std::invalid_argument("time_scale must be positive and finite, it is " +
-                                std::to_string(scale) + ".");
-  return time / scale;
+                                std::to_string(*time_scale) + ".");
+  return time / *time_scale;
 }
 
 Sampler sampler_argument(const std::string& name) {
@@ -127,6 +126,13 @@ py::dict realisations_dict(const std::vector<RealisationMemory>& realisations) {
     for (int k = 0; k < 3; ++k) entry.mutable_at(i, k) = r.entry.active ? r.entry.at[k] : nan;
   }
   return py::dict("seed"_a = seed, "entry"_a = entry, "shift"_a = shift);
+}
+
+double tolerance_argument(double tolerance) {
+  if (!(tolerance > 0 && tolerance < 1))
+    throw std::invalid_argument("tolerance must lie between 0 and 1, it is " +
+                                std::to_string(tolerance) + ".");
+  return tolerance;
 }
 
 FirstHitsQuery query_argument(const py::object& origins, const py::object& directions, double t_max,
@@ -193,7 +199,7 @@ py::dict first_hits_dict(const py::object& gp, const py::object& origins,
   const FirstHitsQuery query =
       query_argument(origins, directions, t_max, start, first_index, seed, threads);
   const ProcessSurface surface(process, {}, memory_argument(memory, "memory"),
-                               sampler_argument(sampler), tolerance);
+                               sampler_argument(sampler), tolerance_argument(tolerance));
   FirstHits hits;
   {
     py::gil_scoped_release release;
@@ -225,11 +231,12 @@ Array line_values_array(const py::object& gp, const py::object& origins,
                         std::uint64_t seed, int threads) {
   if (t.empty()) throw std::invalid_argument("t must hold at least one distance.");
   const double t_max = *std::max_element(t.begin(), t.end());
+  if (!(t_max > 0)) throw std::invalid_argument("t must hold a distance above 0.");
   const auto process = instance_argument<GaussianProcess>(gp, "gp", "a GaussianProcess");
   const FirstHitsQuery query =
       query_argument(origins, directions, t_max, start, first_index, seed, threads);
   const ProcessSurface surface(process, {}, memory_argument(memory, "memory"),
-                               sampler_argument(sampler), tolerance);
+                               sampler_argument(sampler), tolerance_argument(tolerance));
   std::vector<double> values;
   {
     py::gil_scoped_release release;
@@ -254,7 +261,7 @@ void bind_process(py::module_& m) {
       "exp(-Δ²/2) over Δ time\n"
       "scales: realisations of the same seed flow from frame to frame (None: they stand still).")
       .def(py::init([](const py::object& mean, const py::object& sigma, const py::object& kernel,
-                       const py::object& bounds, const py::object& time_scale, double time) {
+                       const py::object& bounds, std::optional<double> time_scale, double time) {
              auto gp = std::make_shared<GaussianProcess>();
              gp->mean = field_argument(mean, "mean");
              gp->sigma = field_argument(sigma, "sigma");

@@ -29,6 +29,8 @@ py::object realisation(const GaussianProcess& gp, const py::object& bounds, int 
                        std::uint64_t seed, int threads, const py::object& progress) {
   const auto corners = points_argument(bounds, "bounds");
   if (corners.size() != 2) refuse("bounds must be (min (3,), max (3,)).");
+  if (!progress.is_none() && !PyCallable_Check(progress.ptr()))
+    refuse("realisation: progress takes a function of the fraction.");
   RealisationQuery query{{corners[0], corners[1]}, resolution, seed, threads_argument(threads)};
   const auto report = [&](double fraction) {
     py::gil_scoped_acquire acquire;

@@ -151,11 +151,12 @@ std::shared_ptr<RenderResult> render_scene(const py::object& scene, const py::ob
 }
 
 std::shared_ptr<RenderResult> merge_results(const py::object& results) {
-  const auto items = to_items(results, "merge");
+  const auto items = to_items(results, "results");
+  if (items.empty()) refuse("results", "takes at least one result, got none");
   std::vector<const RenderResult*> parts;
   for (const py::object& item : items) {
     if (!py::isinstance<RenderResult>(item))
-      refuse("merge", "takes a list of results, got " + shown(item) + " in it");
+      refuse("results", "takes a list of results, got " + shown(item) + " in it");
     parts.push_back(py::cast<const RenderResult*>(item));
   }
   const py::gil_scoped_release release;

@@ -150,21 +150,34 @@ py::dict read(const py::object& path, const std::vector<std::string>& names) {
   return out;
 }
 
-py::object bake(
-    const py::array_t<double, py::array::c_style | py::array::forcecast>& vertices,
-    const py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>& triangles,
-    const py::object& path, int resolution, double margin, const py::object& progress) {
+// Indices of vertices. Whole numbers beyond int are kept out of range, for the bake to refuse them.
+std::vector<std::array<int, 3>> faces_argument(const py::object& triangles) {
+  const py::array given = py::array::ensure(triangles);
+  PyErr_Clear();
+  if (!given || given.ndim() != 2 || given.shape(1) != 3)
+    refuse("bake_mesh_distance: triangles takes integers of shape (M, 3).");
+  if (given.size() > 0 && given.dtype().kind() != 'i' && given.dtype().kind() != 'u')
+    refuse("bake_mesh_distance: triangles takes integers, got numbers of type ",
+           py::str(given.dtype()).cast<std::string>(), ".");
+  const auto indices = py::array_t<std::int64_t, py::array::forcecast>::ensure(given);
+  std::vector<std::array<int, 3>> faces(indices.shape(0));
+  for (py::ssize_t i = 0; i < indices.shape(0); ++i)
+    for (int c = 0; c < 3; ++c)
+      faces[i][c] = static_cast<int>(std::clamp<std::int64_t>(indices.at(i, c), -1, INT_MAX));
+  return faces;
+}
+
+py::object bake(const py::array_t<double, py::array::c_style | py::array::forcecast>& vertices,
+                const py::object& triangles, const py::object& path, int resolution, double margin,
+                const py::object& progress) {
   if (vertices.ndim() != 2 || vertices.shape(1) != 3)
     refuse("bake_mesh_distance: vertices has ", vertices.ndim(), " dimensions; it takes (N, 3).");
-  if (triangles.ndim() != 2 || triangles.shape(1) != 3)
-    refuse("bake_mesh_distance: triangles has ", triangles.ndim(), " dimensions; it takes (M, 3).");
   std::vector<Vec3> points(vertices.shape(0));
   for (py::ssize_t i = 0; i < vertices.shape(0); ++i)
     points[i] = {vertices.at(i, 0), vertices.at(i, 1), vertices.at(i, 2)};
-  std::vector<std::array<int, 3>> faces(triangles.shape(0));
-  for (py::ssize_t i = 0; i < triangles.shape(0); ++i)
-    for (int c = 0; c < 3; ++c)
-      faces[i][c] = static_cast<int>(std::clamp<std::int64_t>(triangles.at(i, c), -1, INT_MAX));
+  const std::vector<std::array<int, 3>> faces = faces_argument(triangles);
+  if (!progress.is_none() && !PyCallable_Check(progress.ptr()))
+    refuse("bake_mesh_distance: progress takes a function of the fraction.");
   const auto report_progress = [&](double fraction) {
     py::gil_scoped_acquire acquire;
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();

@@ -1,5 +1,6 @@
 #include <pybind11/pybind11.h>
 
+#include "binding/argument_errors.h"
 #include "binding/bindings.h"
 #include "core/errors.h"
 
@@ -26,4 +27,5 @@ PYBIND11_MODULE(gpis_native, m) {
   gpis::bind_scene(m);
   gpis::bind_film(m);
   gpis::bind_render(m);
+  gpis::explain_wrong_arguments(m);
 }

@@ -68,8 +68,10 @@ void refuse(const std::string& path, const std::string& sentence) {
 }
 
 std::string shown(const py::handle& value) {
+  const bool short_list =
+      (py::isinstance<py::tuple>(value) || py::isinstance<py::list>(value)) && py::len(value) <= 6;
   if (value.is_none() || py::isinstance<py::bool_>(value) || py::isinstance<py::int_>(value) ||
-      py::isinstance<py::float_>(value) || py::isinstance<py::str>(value)) {
+      py::isinstance<py::float_>(value) || py::isinstance<py::str>(value) || short_list) {
     const py::str text = py::repr(value);
     if (py::len(text) <= 80) return text;
     return std::string(py::str(text[py::slice(0, 77, 1)])) + "…";

@@ -19,7 +19,8 @@ using DoubleArray = py::array_t<double, py::array::c_style | py::array::forcecas
 
 // Throws std::invalid_argument "path: sentence".
 [[noreturn]] void refuse(const std::string& path, const std::string& sentence);
-// What a value is, for messages: a number or text itself, of other things the type (and shape).
+// What a value is, for messages: a number, text or short list itself, of other things the type
+// (and shape).
 std::string shown(const py::handle& value);
 
 // Conversions of one value; they refuse what is of another type or shape, and NaN.

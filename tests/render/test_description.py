@@ -115,7 +115,7 @@ WRONG = [
     ("camera.matrix", np.zeros((4, 4)), "camera.matrix: must be affine: its last row must be 0 0 0 1"),
     ("camera.matrix", np.diag([1, 0, 1, 1.0]), "camera.matrix has an axis of length zero"),
     ("camera.matrix", nan((4, 4)), "camera.matrix: number 15 (counted from 0, in order) is NaN"),
-    ("camera.matrix", [[1, 2], [3]], "camera.matrix: takes numbers of shape (4, 4), got a value of type list"),
+    ("camera.matrix", [[1, 2], [3]], "camera.matrix: takes numbers of shape (4, 4), got [[1, 2], [3]]"),
     ("camera.matrix", np.eye(4).astype(str), "camera.matrix: takes numbers"),
     ("camera.fov_x", 4, "camera.fov_x is 4"),
     ("camera.fov_x", (1, 2), "camera.fov_x: takes a number"),
