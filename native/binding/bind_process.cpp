@@ -3,13 +3,13 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <cstdint>
 #include <set>
 
 #include "binding/arguments.h"
 #include "binding/bindings.h"
+#include "process/at_points.h"
+#include "process/covariance.h"
 #include "process/first_hits.h"
 #include "process/surface.h"
 
@@ -23,19 +23,28 @@ using Array = NumberArray;
 // As render takes; TBB overflows its stack at a million.
 constexpr int kMostThreads = 1024;
 
-Eigen::MatrixXd covariance_matrix(const GaussianProcess& gp, const std::vector<Vec3>& x,
-                                  const std::vector<Vec3>& y) {
-  Eigen::MatrixXd k(x.size(), y.size());
-  for (std::size_t i = 0; i < x.size(); ++i)
-    for (std::size_t j = 0; j < y.size(); ++j)
-      k(i, j) = gp.sigma->value(x[i]) * gp.sigma->value(y[j]) * gp.kernel->covariance(x[i] - y[j]);
-  return k;
-}
-
 Array to_array(const Eigen::MatrixXd& m) {
   Array out({m.rows(), m.cols()});
   for (Eigen::Index i = 0; i < m.rows(); ++i)
     for (Eigen::Index j = 0; j < m.cols(); ++j) out.mutable_at(i, j) = m(i, j);
+  return out;
+}
+
+Array joint_covariance(const GaussianProcess& gp, const py::object& x, const py::object& y) {
+  const Covariance covariance(gp);
+  if (!covariance.differentiable())
+    throw std::invalid_argument("joint_covariance: the kernel " + gp.kernel->describe() +
+                                " has no gradient.");
+  const auto at_x = points_argument(x, "x"), at_y = points_argument(y, "y");
+  const py::ssize_t n = at_x.size(), m = at_y.size();
+  Array out({n, m, py::ssize_t{4}, py::ssize_t{4}});
+  for (py::ssize_t i = 0; i < n; ++i)
+    for (py::ssize_t j = 0; j < m; ++j) {
+      const Eigen::Matrix4d block =
+          covariance.block(covariance.at(at_x[i]), covariance.at(at_y[j]));
+      for (int r = 0; r < 4; ++r)
+        for (int c = 0; c < 4; ++c) out.mutable_at(i, j, r, c) = block(r, c);
+    }
   return out;
 }
 
@@ -45,21 +54,7 @@ Array sample(const GaussianProcess& gp, const py::object& at, py::ssize_t n, std
     throw std::invalid_argument("sample draws at up to 4096 points jointly, these are " +
                                 std::to_string(x.size()) + ".");
   if (n < 0) throw std::invalid_argument("n must not be negative.");
-  if (x.empty()) return to_array(Eigen::MatrixXd(n, 0));  // Eigen's solver takes no empty matrix
-  // Eigenvectors, not Cholesky: the matrix is singular to rounding wherever points are near
-  // (math.md §5, traps).
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance_matrix(gp, x, x));
-  const Eigen::MatrixXd factor =
-      eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
-  Eigen::MatrixXd out(n, x.size());
-  Eigen::VectorXd mean(x.size()), xi(x.size());
-  for (std::size_t i = 0; i < x.size(); ++i) mean[i] = gp.mean->value(x[i]);
-  for (py::ssize_t row = 0; row < n; ++row) {
-    Rng rng(seed, row);
-    for (auto& v : xi) v = rng.normal();
-    out.row(row) = mean + factor * xi;
-  }
-  return to_array(out);
+  return to_array(sample_at(gp, x, n, seed));
 }
 
 // Now, in temporal length scales.
@@ -79,10 +74,14 @@ std::optional<double> time_argument(std::optional<double> time_scale, double tim
 Sampler sampler_argument(const std::string& name) {
   if (name == "auto") return Sampler::automatic;
   if (name == "convolution") return Sampler::convolution;
+  if (name == "markov") return Sampler::markov;
+  if (name == "nystrom") return Sampler::nystrom;
+  if (name == "spectral") return Sampler::spectral;
   if (name == "dense") return Sampler::dense;
   if (name == "realisation") return Sampler::realisation;
   throw std::invalid_argument("sampler is '" + name +
-                              "', it takes 'auto', 'convolution', 'dense' or 'realisation'.");
+                              "', it takes 'auto', 'convolution', 'markov', 'spectral', 'nystrom', "
+                              "'dense' or 'realisation'.");
 }
 
 // What rows have seen of their realisations, memory `global`: seed (N,), and where they were moved
@@ -109,7 +108,7 @@ std::vector<RealisationMemory> realisations_argument(const py::handle& argument,
   for (std::size_t i = 0; i < n; ++i) {
     out[i].seed = seed.at(i);
     if (std::isfinite(shift.at(i)))
-      out[i].entry = {true, {entry.at(i, 0), entry.at(i, 1), entry.at(i, 2)}, shift.at(i), {}};
+      out[i].entry = {true, {entry.at(i, 0), entry.at(i, 1), entry.at(i, 2)}, {shift.at(i), {}}};
   }
   return out;
 }
@@ -122,7 +121,7 @@ py::dict realisations_dict(const std::vector<RealisationMemory>& realisations) {
   for (py::ssize_t i = 0; i < n; ++i) {
     const RealisationMemory& r = realisations[i];
     seed.mutable_at(i) = r.seed;
-    shift.mutable_at(i) = r.entry.active ? r.entry.value : nan;
+    shift.mutable_at(i) = r.entry.active ? r.entry.weight.value : nan;
     for (int k = 0; k < 3; ++k) entry.mutable_at(i, k) = r.entry.active ? r.entry.at[k] : nan;
   }
   return py::dict("seed"_a = seed, "entry"_a = entry, "shift"_a = shift);
@@ -136,8 +135,8 @@ double tolerance_argument(double tolerance) {
 }
 
 FirstHitsQuery query_argument(const py::object& origins, const py::object& directions, double t_max,
-                              const py::object& start, std::uint64_t first_index,
-                              std::uint64_t seed, int threads) {
+                              const py::object& start, const py::object& inside,
+                              std::uint64_t first_index, std::uint64_t seed, int threads) {
   FirstHitsQuery query;
   const auto o = points_argument(origins, "origins"), d = points_argument(directions, "directions");
   if (o.size() != d.size())
@@ -156,6 +155,15 @@ FirstHitsQuery query_argument(const py::object& origins, const py::object& direc
   if (threads < 0 || threads > kMostThreads)
     throw std::invalid_argument("threads must be 0 (all cores) to " + std::to_string(kMostThreads) +
                                 ", it is " + std::to_string(threads) + ".");
+  if (!inside.is_none()) {
+    const auto flags = py::array_t<bool, py::array::c_style>::ensure(inside);
+    if (!py::isinstance<py::array_t<bool>>(inside) || !flags || flags.ndim() != 1 ||
+        static_cast<std::size_t>(flags.shape(0)) != o.size()) {
+      PyErr_Clear();
+      throw std::invalid_argument("inside must be an array of truth values, one a ray.");
+    }
+    query.inside.assign(flags.data(), flags.data() + o.size());
+  }
   if (!start.is_none()) {
     if (!py::isinstance<py::dict>(start))
       throw std::invalid_argument("start must be None or a dict of value and gradient.");
@@ -174,10 +182,12 @@ FirstHitsQuery query_argument(const py::object& origins, const py::object& direc
         gradient.size() != o.size())
       throw std::invalid_argument("start must hold value (N,) and gradient (N, 3), one row a ray.");
     for (std::size_t i = 0; i < o.size(); ++i) {
-      if (!(value.at(i) >= 0) || std::isinf(value.at(i)))
+      const double out = !query.inside.empty() && query.inside[i] ? -value.at(i) : value.at(i);
+      if (!(out >= 0) || std::isinf(out))
         throw std::invalid_argument(
             "start['value'][" + std::to_string(i) +
-            "] must be 0 (on the surface) or positive (outside), and finite.");
+            "] must be 0 (on the surface) or positive (outside; negative for rays inside), and "
+            "finite.");
       query.start.push_back({value.at(i), gradient[i]});
     }
     if (s.contains("realisation"))
@@ -187,24 +197,30 @@ FirstHitsQuery query_argument(const py::object& origins, const py::object& direc
   query.first_index = first_index;
   query.seed = seed;
   query.threads = threads;
+  query.interrupted = [] {
+    const py::gil_scoped_acquire acquire;
+    return PyErr_CheckSignals() != 0;
+  };
   return query;
 }
 
 py::dict first_hits_dict(const py::object& gp, const py::object& origins,
                          const py::object& directions, double t_max, const std::string& memory,
-                         const py::object& start, std::uint64_t first_index,
-                         const std::string& sampler, double tolerance, std::uint64_t seed,
-                         int threads) {
+                         const py::object& start, const py::object& inside,
+                         std::uint64_t first_index, const std::string& sampler, double tolerance,
+                         std::uint64_t seed, int threads) {
   const auto process = instance_argument<GaussianProcess>(gp, "gp", "a GaussianProcess");
   const FirstHitsQuery query =
-      query_argument(origins, directions, t_max, start, first_index, seed, threads);
-  const ProcessSurface surface(process, {}, memory_argument(memory, "memory"),
-                               sampler_argument(sampler), tolerance_argument(tolerance));
+      query_argument(origins, directions, t_max, start, inside, first_index, seed, threads);
+  ProcessSurface surface(process, {}, memory_argument(memory, "memory"), sampler_argument(sampler),
+                         tolerance_argument(tolerance));
+  if (!query.inside.empty()) surface.serve_inside();
   FirstHits hits;
   {
     py::gil_scoped_release release;
     hits = first_hits(surface, query);
   }
+  if (PyErr_Occurred()) throw py::error_already_set();
   const py::ssize_t n = query.rays.size();
   Array t(n), position({n, py::ssize_t{3}}), gradient({n, py::ssize_t{3}}), value(n);
   py::array_t<std::int32_t> part(n);
@@ -227,21 +243,24 @@ py::dict first_hits_dict(const py::object& gp, const py::object& origins,
 Array line_values_array(const py::object& gp, const py::object& origins,
                         const py::object& directions, const std::vector<double>& t,
                         const std::string& memory, const py::object& start,
-                        std::uint64_t first_index, const std::string& sampler, double tolerance,
-                        std::uint64_t seed, int threads) {
+                        const py::object& inside, std::uint64_t first_index,
+                        const std::string& sampler, double tolerance, std::uint64_t seed,
+                        int threads) {
   if (t.empty()) throw std::invalid_argument("t must hold at least one distance.");
   const double t_max = *std::max_element(t.begin(), t.end());
   if (!(t_max > 0)) throw std::invalid_argument("t must hold a distance above 0.");
   const auto process = instance_argument<GaussianProcess>(gp, "gp", "a GaussianProcess");
   const FirstHitsQuery query =
-      query_argument(origins, directions, t_max, start, first_index, seed, threads);
-  const ProcessSurface surface(process, {}, memory_argument(memory, "memory"),
-                               sampler_argument(sampler), tolerance_argument(tolerance));
+      query_argument(origins, directions, t_max, start, inside, first_index, seed, threads);
+  ProcessSurface surface(process, {}, memory_argument(memory, "memory"), sampler_argument(sampler),
+                         tolerance_argument(tolerance));
+  if (!query.inside.empty()) surface.serve_inside();
   std::vector<double> values;
   {
     py::gil_scoped_release release;
     values = line_values(surface, query, t);
   }
+  if (PyErr_Occurred()) throw py::error_already_set();
   Array out({static_cast<py::ssize_t>(query.rays.size()), static_cast<py::ssize_t>(t.size())});
   std::copy(values.begin(), values.end(), out.mutable_data());
   return out;
@@ -255,17 +274,27 @@ void bind_process(py::module_& m) {
       "f = mean + sigma·g: outside where f > 0, the surface is f = 0.\n\n"
       "mean, sigma: field or number; sigma is the standard deviation, in the unit of the mean, not "
       "negative.\n"
-      "kernel: correlation of g. bounds: (min (3,), max (3,)); outside there is no surface. A mean "
+      "kernel: correlation of g. anisotropy: TensorField of squared length scales A(x) (Paciorek "
+      "and "
+      "Schervish); the kernel's\n"
+      "own length_scale, one number, is then a factor on the lengths. bounds: (min (3,), max "
+      "(3,)); outside there is no surface. A mean "
       "on a grid bounds the\n"
       "process to its nodes. time_scale, time: g also depends on time, with the correlation "
       "exp(-Δ²/2) over Δ time\n"
       "scales: realisations of the same seed flow from frame to frame (None: they stand still).")
       .def(py::init([](const py::object& mean, const py::object& sigma, const py::object& kernel,
-                       const py::object& bounds, std::optional<double> time_scale, double time) {
+                       const py::object& anisotropy, const py::object& bounds,
+                       std::optional<double> time_scale, double time) {
              auto gp = std::make_shared<GaussianProcess>();
              gp->mean = field_argument(mean, "mean");
              gp->sigma = field_argument(sigma, "sigma");
              gp->kernel = instance_argument<Kernel>(kernel, "kernel", "a kernel");
+             if (!anisotropy.is_none()) {
+               gp->anisotropy =
+                   instance_argument<TensorField>(anisotropy, "anisotropy", "a TensorField");
+               const Covariance checks_kernel(*gp);
+             }
              if (!bounds.is_none()) {
                const auto corners = points_argument(bounds, "bounds");
                if (corners.size() != 2)
@@ -283,8 +312,8 @@ void bind_process(py::module_& m) {
                                            "where a grid holds the variance.");
              return gp;
            }),
-           "mean"_a, "sigma"_a, "kernel"_a, py::kw_only(), "bounds"_a = py::none(),
-           "time_scale"_a = py::none(), "time"_a = 0.0)
+           "mean"_a, "sigma"_a, "kernel"_a, py::kw_only(), "anisotropy"_a = py::none(),
+           "bounds"_a = py::none(), "time_scale"_a = py::none(), "time"_a = 0.0)
       .def(
           "mean",
           [](const GaussianProcess& gp, const py::object& x) {
@@ -301,6 +330,9 @@ void bind_process(py::module_& m) {
                 covariance_matrix(gp, points_argument(x, "x"), points_argument(y, "y")));
           },
           "x"_a, "y"_a, "Covariance of f between points x (N, 3) and y (M, 3): (N, M).")
+      .def("joint_covariance", &joint_covariance, "x"_a, "y"_a,
+           "Covariance of g and its gradient (g, ∇g) between points x (N, 3) and y (M, 3): "
+           "(N, M, 4, 4). Without sigma.")
       .def("sample", &sample, "points"_a, "n"_a, "seed"_a = 0,
            "n joint samples of f at points (N, 3), N up to 4096: (n, N).")
       .def(
@@ -314,23 +346,27 @@ void bind_process(py::module_& m) {
           },
           "What a render of this process chooses and leaves out.");
 
-  m.def("first_hits", &first_hits_dict, "gp"_a, "origins"_a, "directions"_a, "t_max"_a,
-        py::kw_only(), "memory"_a = "renewal+", "start"_a = py::none(), "first_index"_a = 0,
-        "sampler"_a = "auto", "tolerance"_a = 1e-3, "seed"_a = 0, "threads"_a = 0,
-        "First change of sign from outside to inside along rays: dict of t (N,) (inf = none), "
-        "position (N, 3), gradient (N, 3),\n"
-        "part (N,) (-1 = none), state (the `start` of rays that leave the hits) and counters.\n\n"
-        "origins, directions (N, 3), unit length. start: None (rays come from outside) or "
-        "dict(value (N,), gradient (N, 3)):\n"
-        "rays leave a point where f = value (0 on the surface), remembered as `memory` says "
-        "('none', 'renewal', 'renewal+', 'global').\n"
-        "sampler: 'auto', 'convolution', 'dense' or 'realisation'. tolerance: probability of a "
-        "missed root per "
-        "ray. Row i uses the random\n"
-        "stream (seed, first_index + i), whatever the number of threads.");
+  m.def(
+      "first_hits", &first_hits_dict, "gp"_a, "origins"_a, "directions"_a, "t_max"_a, py::kw_only(),
+      "memory"_a = "renewal+", "start"_a = py::none(), "inside"_a = py::none(), "first_index"_a = 0,
+      "sampler"_a = "auto", "tolerance"_a = 1e-3, "seed"_a = 0, "threads"_a = 0,
+      "First change of sign from outside to inside along rays: dict of t (N,) (inf = none), "
+      "position (N, 3), gradient (N, 3),\n"
+      "part (N,) (-1 = none), state (the `start` of rays that leave the hits) and counters.\n\n"
+      "origins, directions (N, 3), unit length. start: None (rays come from outside) or "
+      "dict(value (N,), gradient (N, 3)):\n"
+      "rays leave a point where f = value (0 on the surface), remembered as `memory` says "
+      "('none', 'renewal', 'renewal+', 'global').\n"
+      "inside: (N,) bool, rays that travel inside the body: their first change of sign to "
+      "outside.\n"
+      "sampler: 'auto', 'convolution', 'markov', 'spectral', 'nystrom', 'dense' or 'realisation'. "
+      "tolerance: probability of a missed root per "
+      "ray. Row i uses the random\n"
+      "stream (seed, first_index + i), whatever the number of threads.");
   m.def("line_values", &line_values_array, "gp"_a, "origins"_a, "directions"_a, "t"_a,
-        py::kw_only(), "memory"_a = "renewal+", "start"_a = py::none(), "first_index"_a = 0,
-        "sampler"_a = "auto", "tolerance"_a = 1e-3, "seed"_a = 0, "threads"_a = 0,
+        py::kw_only(), "memory"_a = "renewal+", "start"_a = py::none(), "inside"_a = py::none(),
+        "first_index"_a = 0, "sampler"_a = "auto", "tolerance"_a = 1e-3, "seed"_a = 0,
+        "threads"_a = 0,
         "Values of f at distances t (M,) on the sample paths that first_hits draws for the same "
         "arguments: (N, M); NaN where a\n"
         "path was not sampled (behind its hit, or where the surface is certainly absent).");

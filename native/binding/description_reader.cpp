@@ -225,8 +225,9 @@ ObjectDescription read_object(const py::handle& value, const std::string& path, 
     refuse(r.path_of("process"), "takes a GaussianProcess, got " + shown(process));
   o.process = py::cast<std::shared_ptr<GaussianProcess>>(process);
   o.memory = memory_argument(r.text("memory", "renewal+"), r.path_of("memory"));
-  o.sampler =
-      static_cast<Sampler>(r.choice("sampler", {"auto", "convolution", "dense", "realisation"}, 0));
+  o.sampler = static_cast<Sampler>(r.choice(
+      "sampler", {"auto", "convolution", "markov", "spectral", "nystrom", "dense", "realisation"},
+      0));
   r.finish("a gpis object");
   return o;
 }

@@ -25,7 +25,9 @@
   X(line_split_limit, "steps no longer divided: narrower than the tolerance")                \
   X(realisation_moved,                                                                       \
     "rays that entered a kept realisation inside and were moved out for themselves alone")   \
+  X(line_reach_limit, "lines longer than the tables of the spectral sampler")                \
   X(factorisations, "covariance matrices factorised")                                        \
+  X(pivots_dropped, "rows left out of a covariance matrix: determined by the others")        \
   X(mean_lookups, "evaluations of a mean that is not constant")                              \
   X(sigma_lookups, "evaluations of a deviation that is not constant")                        \
   X(truncated_normals, "starts drawn conditioned on being outside")                          \

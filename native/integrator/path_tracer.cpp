@@ -76,7 +76,11 @@ struct PathTracer::Impl {
   Counters* counters = nullptr;
 };
 
-PathTracer::PathTracer(const Scene& scene) : impl_(std::make_unique<Impl>(scene)) {}
+PathTracer::PathTracer(const Scene& scene, const std::atomic<bool>* stop)
+    : impl_(std::make_unique<Impl>(scene)) {
+  for (Line& line : impl_->lines) line.stop_when(stop);
+  impl_->shadow_line.stop_when(stop);
+}
 PathTracer::~PathTracer() = default;
 
 PathSample PathTracer::trace(const Ray& camera_ray, double t_max, const BlockPoints& points,
@@ -158,7 +162,8 @@ bool PathTracer::Impl::closest(const Ray& ray, double t_max, Vertex& v) {
     const auto [enter, leave] = clip(surface.bounds(), ray.origin, ray.direction, 0, nearest);
     met[i] = enter <= leave;
     if (!met[i]) continue;
-    const Start start = surface.start_from(memory[i] ? &*memory[i] : nullptr, &realisations[i]);
+    const Start start =
+        surface.start_from(memory[i] ? &*memory[i] : nullptr, false, &realisations[i]);
     const double t = surface.first_hit(lines[i], ray, nearest, start, *rng, *counters);
     if (t >= nearest) continue;
     nearest = t;
@@ -211,7 +216,7 @@ bool PathTracer::Impl::visible(const Ray& ray, double distance) {
     if (enter > leave) continue;
     RealisationMemory realisation = realisations[i];
     const Start start =
-        surface.start_from(shadow_memory[i] ? &*shadow_memory[i] : nullptr, &realisation);
+        surface.start_from(shadow_memory[i] ? &*shadow_memory[i] : nullptr, false, &realisation);
     if (surface.first_hit(shadow_line, ray, distance, start, light_rng, *counters) < distance)
       return false;
   }

@@ -2,6 +2,7 @@
 // stochastic surfaces.
 #pragma once
 
+#include <atomic>
 #include <memory>
 
 #include "core/block_points.h"
@@ -30,7 +31,8 @@ struct PathSample {
 // Per-thread working memory (lines, remembered states): made once per thread, reused by every path.
 class PathTracer {
  public:
-  explicit PathTracer(const Scene& scene);
+  // Paths end soon after *stop becomes true; what they gathered is then to be dropped.
+  explicit PathTracer(const Scene& scene, const std::atomic<bool>* stop = nullptr);
   ~PathTracer();
   // `points`: those of the sample; the tracer leaves the set kPixelDecision to the camera.
   PathSample trace(const Ray& camera_ray, double t_max, const BlockPoints& points, Rng& rng,

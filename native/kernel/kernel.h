@@ -18,6 +18,7 @@ struct Term {
   Mat3 whitening;    // B, A⁻¹ = BᵀB; rows orthogonal, a zero row = constant along that axis
   Vec3 wave_vector;  // k, 0 = none
 
+  bool modulated() const { return length(wave_vector) > 0; }
   // q = |B r|, below the square root of the largest double.
   double distance(const Vec3& r) const { return std::min(length(whitening * r), 1e150); }
   double covariance(const Vec3& r) const;

@@ -20,7 +20,7 @@ ConvolutionPath::Plan::Plan(const GaussianProcess& process, const Box3&)
     : line(squared_exponential(process)) {}
 
 std::unique_ptr<LineSampler> make_convolution(const GaussianProcess& process, const Box3& bounds) {
-  return make_sampler<ConvolutionPath>(process, bounds);
+  return make_sampler<ConvolutionPath, Fields::by_type>(process, bounds);
 }
 
 }  // namespace gpis

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -51,10 +52,13 @@ class ConvolutionPath {
     double g, dg;
     at(0, line_.anchor(), rng, g, dg);
     conditioned_ = true;
+    expanded_ = false;
+    value_ = known.value;
     delta_value_ = known.value - g;
     // Conditioned on the value alone, g - ĝ = κ(q)(g₀ - ĝ(0)) has no slope at q = 0.
     const double slope = known.slope_known ? known.slope : dg;
     delta_slope_ = line_.per_length(slope - dg);
+    slope_ = line_.per_length(slope);
     if (known.gradient_known) line_.remember(known.gradient);
     // max κ = 1, max qκ = .607.
     pull_ = std::max(0.0, -known.value) + 0.61 * std::max(0.0, -line_.per_length(slope));
@@ -88,8 +92,9 @@ class ConvolutionPath {
 
   // Anywhere in [kh, (k+1)h], by ONE node set for the whole cell (definitions E5). The weights
   // follow from two exponentials: e^{-(x-s)²} = e^{-x²} e^{2xs} e^{-s²}.
-  void at(long cell, double t, Rng&, double& g, double& dg) const {
+  void at(long cell, double t, Rng&, double& g, double& dg) {
     const double q = line_.q(t), x = q - cell * kStep;
+    if (conditioned_ && q < kNear) return at_near(q, g, dg);
     const double up = std::exp(2 * kStep * x), down = 1 / up;
     double power[kNodes];
     power[7] = std::exp(-x * x);
@@ -114,6 +119,9 @@ class ConvolutionPath {
   // The cubic is off by u²(h-u)² |g''''| / 24 <= (4/3)(B₁+B₂) (h/2)⁴ |g''''| / 24, and 4.5 standard
   // deviations of g'''' are 4.5 √105.
   static constexpr double kDeviation = 0.16;
+  // Where the expansion about a known start serves, to rounding.
+  static constexpr double kNear = 0.03;
+  static constexpr int kTerms = 7;
 
   struct Run {
     long first;
@@ -156,6 +164,38 @@ class ConvolutionPath {
     dg = xi.dot(weights.slope);
   }
 
+  // Close to a known start, what the path adds to it is far smaller than its parts (oracle 8):
+  //   g = e^{-q²/2} [g₀ + g₀'q + Σ_{n>=2} qⁿ/n! Σ_j φ(s_j) ξ_j He_n(2s_j)],
+  // from the generating function e^{2sq - q²/2} = Σ He_n(2s) qⁿ/n! of Hermite's polynomials.
+  void at_near(double q, double& g, double& dg) {
+    if (!expanded_) expand();
+    double sum = 0, slope = 0;  // Horner
+    for (int n = kTerms - 1; n >= 0; --n) {
+      sum = sum * q + moments_[n];
+      slope = slope * q + (n + 2) * moments_[n];
+    }
+    const double k = std::exp(-0.5 * q * q), bracket = value_ + q * (slope_ + q * sum);
+    g = k * bracket;
+    dg = k * (slope_ + q * slope - q * bracket) * line_.inverse_length();
+  }
+
+  void expand() {
+    expanded_ = true;
+    const Window xi = window(0);
+    moments_.fill(0);
+    for (int i = 0; i < kNodes; ++i) {
+      const double x = 2 * kTable.node[i], w = kTable.gauss[i] * xi[i];
+      double before = 1, now = x, factorial = 1;
+      for (int n = 2; n < kTerms + 2; ++n) {
+        const double next = x * now - (n - 1) * before;
+        before = now;
+        now = next;
+        factorial *= n;
+        moments_[n - 2] += w * now / factorial;
+      }
+    }
+  }
+
   // From here on derivatives are per t.
   void condition(double q, double& g, double& dg) const {
     if (conditioned_ && q <= 9) {  // exp(-q²/2) < 3e-18 beyond
@@ -177,6 +217,9 @@ class ConvolutionPath {
   double step_ = 1, deviation_ = 0, pull_ = 0;
   double delta_value_ = 0, delta_slope_ = 0;
   bool conditioned_ = false;
+  double value_ = 0, slope_ = 0;  // of a known start, per length scale
+  std::array<double, kTerms> moments_{};
+  bool expanded_ = false;
   std::vector<double> nodes_;
   std::vector<Run> runs_;
 };

@@ -1,9 +1,11 @@
 #include "process/dense_path.h"
 
 #include <Eigen/Eigenvalues>
-#include <cmath>
+#include <Eigen/LU>
+#include <Eigen/QR>
+#include <map>
 #include <mutex>
-#include <stdexcept>
+#include <tuple>
 
 #include "field/check.h"
 #include "process/march_sampler.h"
@@ -11,106 +13,247 @@
 namespace gpis {
 namespace {
 
-// Covariance of (g, g') at two points q apart, κ = exp(-q²/2): cov(g,g) = κ, cov(g, g') = -∂κ/∂q…
-Eigen::Matrix2d block(double q) {
-  const double k = std::exp(-0.5 * q * q);
-  Eigen::Matrix2d b;  // rows: (g, g') at x, columns at y, q = x - y
-  b << k, q * k, -q * k, (1 - q * q) * k;
+constexpr double kMaxReach = 64;
+constexpr int kHalvings = 8;  // of a rough cell
+
+// Covariance of (g, g') at two points, q = x - y: rows x, columns y.
+Eigen::Matrix2d block(const Radial& radial, double q) {
+  const double a = std::abs(q), slope = q * radial.slope_over_q(a);
+  Eigen::Matrix2d b;
+  b << radial.value(a), -slope, slope, -radial.curvature(a);
   return b;
+}
+
+// The law of the midpoint given value and slope at both ends. What Matérn and Wong leave open falls
+// off as h³ and faster, and would cancel in double: long double throughout.
+DensePath::Plan::Halving halving(const Radial& radial, double h) {
+  using Real = long double;
+  using Matrix = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
+  const Real points[] = {0, h, Real(h) / 2};
+  // κ and its derivatives in long double.
+  const auto covariance = [&](Real q, int dx, int dy) -> Real {
+    const Real a = std::abs(q), sign = q < 0 ? -1 : 1;
+    Real value, slope, curvature;
+    const Real r3 = std::sqrt(Real(3)), r5 = std::sqrt(Real(5));
+    if (radial.family == Radial::Family::matern32) {
+      const Real e = std::exp(-r3 * a);
+      value = (1 + r3 * a) * e;
+      slope = -3 * a * e;
+      curvature = (-3 + 3 * r3 * a) * e;
+    } else if (radial.family == Radial::Family::matern52) {
+      const Real e = std::exp(-r5 * a);
+      value = (1 + r5 * a + 5 * a * a / 3) * e;
+      slope = -Real(5) / 3 * a * (1 + r5 * a) * e;
+      curvature = (-Real(5) / 3 * (1 + r5 * a) + Real(25) / 3 * a * a) * e;
+    } else {
+      const Real ea = std::exp(-a / r3), eb = std::exp(-r3 * a);
+      value = (3 * ea - eb) / 2;
+      slope = r3 / 2 * (eb - ea);
+      curvature = (ea - 3 * eb) / 2;
+    }
+    if (dx + dy == 0) return value;
+    if (dx + dy == 2) return -curvature;
+    return dx ? sign * slope : -sign * slope;
+  };
+  Matrix all(6, 6);
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j) all(i, j) = covariance(points[i / 2] - points[j / 2], i % 2, j % 2);
+  const Matrix ends = all.topLeftCorner(4, 4), cross = all.bottomLeftCorner(2, 4);
+  const Matrix mean = ends.fullPivLu().solve(cross.transpose()).transpose();
+  const Matrix rest = all.bottomRightCorner(2, 2) - mean * cross.transpose();
+  DensePath::Plan::Halving out;
+  out.mean = mean.cast<double>();
+  // Value and slope of the midpoint are independent: symmetry.
+  out.factor << std::sqrt(std::max(Real(0), rest(0, 0))), 0, 0,
+      std::sqrt(std::max(Real(0), rest(1, 1)));
+  return out;
+}
+
+// Standard deviation of g from its cubic in the middle of an interval.
+double cubic_rest(const Radial& radial, double h) {
+  const Eigen::Vector4d w(0.5, h / 8, 0.5, -h / 8);
+  Eigen::Matrix4d k;
+  Eigen::Vector4d c;
+  for (int i = 0; i < 2; ++i) {
+    for (int j = 0; j < 2; ++j) k.block<2, 2>(2 * i, 2 * j) = block(radial, (i - j) * h);
+    c.segment<2>(2 * i) = block(radial, h / 2 - i * h).row(0).transpose();
+  }
+  return std::sqrt(std::max(0.0, 1 - 2 * w.dot(c) + w.dot(k * w)));
 }
 
 }  // namespace
 
-const DensePath::Factor& DensePath::factor(double reach, Counters& counters) {
-  static Factor factors[3];
-  static std::once_flag once[3];
-  int i = 0;
-  while (i < 2 && reach > kReaches[i]) ++i;
-  std::call_once(once[i], [i, &counters] {
-    const int points = static_cast<int>(std::lround(kReaches[i] / kStep)) + 2;
-    Eigen::MatrixXd k(2 * points, 2 * points);
-    for (int r = 0; r < points; ++r)
-      for (int c = 0; c < points; ++c) k.block<2, 2>(2 * r, 2 * c) = block((r - c) * kStep);
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(k);
-    if (eigen.info() != Eigen::Success)
-      throw std::runtime_error("The dense sampler could not factorise its covariance matrix.");
-    const auto& values = eigen.eigenvalues();  // increasing
-    const double floor = 1e-14 * values[values.size() - 1];
-    int rank = 0;
-    while (rank < values.size() && values[values.size() - 1 - rank] > floor) ++rank;
-    factors[i] = eigen.eigenvectors().rightCols(rank) * values.tail(rank).cwiseSqrt().asDiagonal();
-    ++counters.factorisations;
-  });
-  return factors[i];
-}
+class DenseFactor {
+ public:
+  using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  DenseFactor(const Radial& radial, double step, int points)
+      : radial_(radial), step_(step), points_(points) {}
+
+  const Matrix& matrix(Counters& counters) {
+    std::call_once(once_, [&] {
+      Eigen::MatrixXd k(2 * points_, 2 * points_);
+      for (int r = 0; r < points_; ++r)
+        for (int c = 0; c < points_; ++c)
+          k.block<2, 2>(2 * r, 2 * c) = block(radial_, (r - c) * step_);
+      const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(k);
+      if (eigen.info() != Eigen::Success)
+        throw std::runtime_error("The dense sampler could not factorise its covariance matrix.");
+      // Eigenvalues below 1e-14 of the largest are rounding noise of the matrix itself.
+      const auto& values = eigen.eigenvalues();  // increasing
+      const double floor = 1e-14 * values[values.size() - 1];
+      Eigen::Index rank = 0;
+      while (rank < values.size() && values[values.size() - 1 - rank] > floor) ++rank;
+      const Eigen::MatrixXd root =
+          eigen.eigenvectors().rightCols(rank) * values.tail(rank).cwiseSqrt().asDiagonal();
+      const Eigen::MatrixXd qr = root.transpose().householderQr().matrixQR();
+      matrix_ = qr.triangularView<Eigen::Upper>().transpose();
+      ++counters.factorisations;
+    });
+    return matrix_;
+  }
+
+  // Processes of one correlation share it.
+  static std::shared_ptr<DenseFactor> shared(const Radial& radial, double step, int points) {
+    static std::mutex mutex;
+    static std::map<std::tuple<Radial::Family, double, double, int>, std::shared_ptr<DenseFactor>>
+        factors;
+    std::lock_guard lock(mutex);
+    auto& factor = factors[{radial.family, radial.alpha, step, points}];
+    if (!factor) factor = std::make_shared<DenseFactor>(radial, step, points);
+    return factor;
+  }
+
+ private:
+  Radial radial_;
+  double step_;
+  int points_;
+  std::once_flag once_;
+  Matrix matrix_;
+};
 
 DensePath::Plan::Plan(const GaussianProcess& process, const Box3& bounds)
     : line(single_term(process, "The dense sampler")) {
-  if (line.radial.family != Radial::Family::squared_exponential)
-    refuse("The dense sampler serves the squared exponential, not ", process.kernel->describe(),
-           ".");
-  const double diagonal = length(bounds.max - bounds.min);
-  const double lengths = diagonal / process.kernel->min_length_scale();
+  const Radial& radial = line.radial;
+  if (!radial.differentiable())
+    refuse("The dense sampler serves correlations with a derivative, not ",
+           process.kernel->describe(), ".");
+  const double lengths = length(bounds.max - bounds.min) / process.kernel->min_length_scale();
   if (!(lengths <= kMaxReach))
     refuse("The dense sampler serves bounds of up to ", kMaxReach,
            " length scales across, these have ", lengths,
-           ": give the process smaller bounds or take the convolution sampler.");
-}
-
-void DensePath::reset(const Plan& plan, const LineGeometry& line, double anchor, double t_end,
-                      Counters& counters) {
-  line_.reset(plan.line, line, anchor);
-  step_ = kStep / line_.inverse_length();
-  factor_ = &factor(line_.q(t_end), counters);
-  conditioned_ = drawn_ = false;
-}
-
-// By Matheron's rule, as the convolution does.
-double DensePath::start(const PathStart& known, Rng& rng, Counters& counters) {
-  prepare(0, rng, counters);
-  double g, dg;
-  point(0, g, dg);
-  const double slope = known.slope_known ? known.slope : dg;
-  conditioned_ = true;
-  delta_value_ = known.value - g;
-  delta_slope_ = line_.per_length(slope - dg);
-  if (known.gradient_known) line_.remember(known.gradient);
-  pull_ = std::max(0.0, -known.value) + 0.61 * std::max(0.0, -line_.per_length(slope));
-  return slope;
-}
-
-void DensePath::prepare(long, Rng& rng, Counters& counters) {
-  if (drawn_) return;
-  drawn_ = true;
-  modes_.resize(factor_->cols());
-  for (auto& m : modes_) m = rng.normal();
-  counters.line_normals += modes_.size();
-}
-
-void DensePath::point(long k, double& g, double& dg) const {
-  g = factor_->row(2 * k).dot(modes_);
-  dg = factor_->row(2 * k + 1).dot(modes_);
-  if (conditioned_) {
-    const double q = k * kStep, c = std::exp(-0.5 * q * q), x = delta_value_ + q * delta_slope_;
-    g += c * x;
-    dg += c * (delta_slope_ - q * x);
+           ": give the process smaller bounds or take sampler 'auto'.");
+  if (radial.smooth()) {
+    double rest = cubic_rest(radial, step);
+    while (rest > 1e-4 * 1.05 && step > 1e-3) rest = cubic_rest(radial, step /= 2);
+    correlation_error = 2 * rest;
+  } else {
+    power = radial.family == Radial::Family::matern52 ? 2.5 : 1.5;
+    const double rest = cubic_rest(radial, step);
+    // (B₁+B₂)(½) = ¾; 5% for what smaller intervals deviate more, relative to h^power.
+    deviation = 4.5 * 1.05 * rest / 0.75 / std::pow(step, power);
+    for (int i = 0; i < kHalvings; ++i) halvings.push_back(halving(radial, std::ldexp(step, -i)));
+    const double finest = deviation / 4.5 * std::pow(std::ldexp(step, -kHalvings), power);
+    correlation_error = 2 * finest + (power > 2 ? rest * rest : 0);
   }
-  dg *= line_.inverse_length();
+  for (reach = 8; reach < lengths;) reach *= 2;
+  factor = DenseFactor::shared(radial, step, static_cast<int>(std::lround(reach / step)) + 2);
 }
 
-void DensePath::at(long cell, double t, Rng&, double& g, double& dg) const {
-  double a, da, b, db;
-  point(cell, a, da);
-  point(cell + 1, b, db);
+void DensePath::reset(const Plan& plan, const LineGeometry& line, double anchor, double,
+                      Counters& counters) {
+  plan_ = &plan;
+  counters_ = &counters;
+  line_.reset(plan.line, line, anchor);
+  step_ = plan.step / line_.inverse_length();
+  factor_ = &plan.factor->matrix(counters);
+  conditioned_ = false;
+  modes_.clear();
+  nodes_.clear();
+}
+
+void DensePath::start_free(Rng& rng, Counters& counters, double& g, double& dg) {
+  nodes_.assign(1, point(0, rng, counters));
+  read(nodes_.front(), g, dg);
+}
+
+// By Matheron's rule (math.md §5.1): g(q) += κ(q)Δ₀ - κ'(q)/λ₂ Δ₁.
+double DensePath::start(const PathStart& known, Rng& rng, Counters& counters) {
+  conditioned_ = false;
+  const Node prior = point(0, rng, counters);
+  start_value_ = known.value;
+  start_slope_ = known.slope_known ? line_.per_length(known.slope) : prior.dg;
+  delta_value_ = start_value_ - prior.g;
+  delta_slope_ = start_slope_ - prior.dg;
+  conditioned_ = true;
+  if (known.gradient_known) line_.remember(known.gradient);
+  nodes_.assign(1, {0, start_value_, start_slope_});
+  return start_slope_ * line_.inverse_length();
+}
+
+double DensePath::pull(double t) const {
+  if (!conditioned_) return 0;
+  const Radial& radial = plan_->line.radial;
+  // κ and, beyond its peak at q < 1, -κ' fall.
+  const double q = std::max(line_.q(t), 1.0);
+  return std::max(0.0, -start_value_) * radial.value(q == 1 ? 0 : q) +
+         std::max(0.0, -start_slope_) * std::max(q == 1 ? 0.61 : 0, q * radial.transverse(q));
+}
+
+// The joint sample and what the start adds to it at point k.
+DensePath::Node DensePath::point(long k, Rng& rng, Counters& counters) {
+  const long used = std::min<long>(2 * k + 2, factor_->cols());
+  while (static_cast<long>(modes_.size()) < used) {
+    modes_.push_back(rng.normal());
+    ++counters.line_normals;
+  }
+  const Eigen::Map<const Eigen::VectorXd> modes(modes_.data(), used);
+  Node node{k * plan_->step, factor_->row(2 * k).head(used).dot(modes),
+            factor_->row(2 * k + 1).head(used).dot(modes)};
+  if (conditioned_) {
+    const Radial& radial = plan_->line.radial;
+    const double c = radial.transverse(node.q), slope = -plan_->line.lambda2 * node.q * c;
+    node.g += radial.value(node.q) * delta_value_ + node.q * c * delta_slope_;
+    node.dg += slope * delta_value_ - radial.curvature(node.q) / plan_->line.lambda2 * delta_slope_;
+  }
+  return node;
+}
+
+void DensePath::prepare(long cell, Rng& rng, Counters& counters) {
+  const double left = cell * plan_->step;
+  if (nodes_.back().q < left) nodes_.push_back(point(cell, rng, counters));
+  if (nodes_.back().q < left + plan_->step) nodes_.push_back(point(cell + 1, rng, counters));
+}
+
+void DensePath::at(long cell, double t, Rng& rng, double& g, double& dg) {
+  const double q = std::clamp(line_.q(t), cell * plan_->step, (cell + 1) * plan_->step);
+  auto right = std::upper_bound(nodes_.begin(), nodes_.end(), q,
+                                [](double x, const Node& node) { return x < node.q; });
+  if ((right - 1)->q == q) return read(*(right - 1), g, dg);
+  // A rough path: halve until the piece that holds q is as short as it gets.
+  for (double width = right->q - (right - 1)->q; !plan_->halvings.empty();) {
+    const auto level = static_cast<std::size_t>(std::lround(std::log2(plan_->step / width)));
+    if (level >= plan_->halvings.size()) break;
+    const Node &a = *(right - 1), &b = *right;
+    const Plan::Halving& by = plan_->halvings[level];
+    const Eigen::Vector2d z = by.mean * Eigen::Vector4d(a.g, a.dg, b.g, b.dg) +
+                              by.factor * Eigen::Vector2d(rng.normal(), rng.normal());
+    counters_->line_normals += 2;
+    width /= 2;
+    right = nodes_.insert(right, {a.q + width, z[0], z[1]});
+    if (right->q == q) return read(*right, g, dg);
+    if (right->q < q) ++right;
+  }
   // Bernstein form of the cubic through both ends.
-  const double s = line_.q(t) / kStep - cell, r = 1 - s;
-  const double c1 = a + da * step_ / 3, c2 = b - db * step_ / 3;
-  g = r * r * r * a + 3 * r * r * s * c1 + 3 * r * s * s * c2 + s * s * s * b;
-  dg = 3 * (r * r * (c1 - a) + 2 * r * s * (c2 - c1) + s * s * (b - c2)) / step_;
+  const Node &a = *(right - 1), &b = *right;
+  const double h = b.q - a.q, s = (q - a.q) / h, r = 1 - s;
+  const double c1 = a.g + a.dg * h / 3, c2 = b.g - b.dg * h / 3;
+  g = r * r * r * a.g + 3 * r * r * s * c1 + 3 * r * s * s * c2 + s * s * s * b.g;
+  dg = 3 * (r * r * (c1 - a.g) + 2 * r * s * (c2 - c1) + s * s * (b.g - c2)) / h *
+       line_.inverse_length();
 }
 
 std::unique_ptr<LineSampler> make_dense(const GaussianProcess& process, const Box3& bounds) {
-  return make_sampler<DensePath>(process, bounds);
+  return make_sampler<DensePath, Fields::any>(process, bounds);
 }
 
 }  // namespace gpis

@@ -1,16 +1,27 @@
 // Sampler 5, dense: values and slopes of g at all points of a line drawn JOINTLY from their
-// covariance, the reference for the other samplers. The points stand at a fixed spacing in units of
-// the length scale, so the covariance of a stationary kernel is factorised once per process, not
-// per ray. Between two points the path is the cubic through both values and slopes (standard
-// deviation of what that leaves out: 1.0e-4).
+// covariance, the reference for the other samplers; any one radial correlation with a derivative.
+// The points stand at a fixed spacing in units of the length scale, so the covariance is factorised
+// once per correlation, not per ray. Between two points
+//  - a smooth path is the cubic through both values and slopes: the spacing is chosen so that this
+//    leaves out less than 1e-4 standard deviations;
+//  - a rough path (Matérn, Wong) is halved by its exact law given value and slope at both ends,
+//  down
+//    to kFinest of a cell, and cubic below. For Matérn 3/2 and Wong that law is the whole truth;
+//    Matérn 5/2 also knows g'' (its effect on the correlation is below the variance of the bridge).
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
+#include <vector>
 
 #include "process/gaussian_process.h"
 #include "process/radial_line.h"
 
 namespace gpis {
+
+// K = L Lᵀ for the vector (g_0, g'_0, g_1, g'_1, …): L is lower triangular, so a line draws only as
+// far as it gets, and has no more columns than K has significant eigenvalues.
+class DenseFactor;
 
 class DensePath {
  public:
@@ -18,8 +29,19 @@ class DensePath {
   static constexpr double kLastStep = 1e-5;
   struct Plan {
     Plan(const GaussianProcess& process, const Box3& bounds);
-    double correlation_error = 2e-4;
+
+    // Midpoint of an interval: mean by (g, g' at both ends), rest by two normals.
+    struct Halving {
+      Eigen::Matrix<double, 2, 4> mean;
+      Eigen::Matrix2d factor;
+    };
+    double correlation_error = 0;
     RadialLine::Plan line;
+    double step = 0.25;               // of a cell, in length scales
+    double reach = 0;                 // length scales that one joint sample covers
+    double deviation = 0, power = 0;  // of a rough path, see deviation()
+    std::vector<Halving> halvings;    // of a rough path: of a cell, of half a cell, …
+    std::shared_ptr<DenseFactor> factor;
   };
 
   void reset(const Plan& plan, const LineGeometry& line, double anchor, double t_end,
@@ -31,38 +53,39 @@ class DensePath {
     mean = 0;
     deviation = line_.slope_deviation();
   }
-  void start_free(Rng& rng, Counters& counters, double& g, double& dg) {
-    prepare(0, rng, counters);
-    at_left(0, g, dg);
-  }
+  void start_free(Rng& rng, Counters& counters, double& g, double& dg);
   double start(const PathStart& known, Rng& rng, Counters& counters);
-  double pull(double t) const { return conditioned_ && line_.q(t) < 6 ? pull_ : 0; }
+  double pull(double t) const;
   void prepare(long cell, Rng& rng, Counters& counters);
-  void at_left(long cell, double& g, double& dg) const { point(cell, g, dg); }
-  void at_right(long cell, double& g, double& dg) const { point(cell + 1, g, dg); }
-  void at(long cell, double t, Rng&, double& g, double& dg) const;
-  double deviation(double) const { return 0; }
+  void at_right(long, double& g, double& dg) const { read(nodes_.back(), g, dg); }
+  void at(long cell, double t, Rng& rng, double& g, double& dg);
+  double deviation(double h) const {
+    if (plan_->deviation == 0) return 0;
+    const double q = h * line_.inverse_length();
+    return plan_->deviation * q * std::sqrt(q) * (plan_->power > 2 ? q : 1);
+  }
   PathGradient gradient(double t, double, double dg, Rng&) const { return line_.gradient(t, dg); }
 
  private:
-  static constexpr double kStep = 0.25;
-  static constexpr double kMaxReach = 64;  // length scales that one joint sample can cover
-  static constexpr double kReaches[] = {8, 24, kMaxReach};
+  struct Node {  // slope per length scale
+    double q, g, dg;
+  };
+  Node point(long k, Rng& rng, Counters& counters);
+  void read(const Node& node, double& g, double& dg) const {
+    g = node.g;
+    dg = node.dg * line_.inverse_length();
+  }
 
-  // K = F Fᵀ for the interleaved vector (g_0, g'_0, g_1, g'_1, …), columns the significant
-  // eigenvectors: eigenvalues below 1e-14 of the largest are rounding noise of the matrix itself.
-  using Factor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  static const Factor& factor(double reach, Counters& counters);
-
-  void point(long k, double& g, double& dg) const;
-
+  const Plan* plan_ = nullptr;
   RadialLine line_;
-  double step_ = 1, pull_ = 0;
+  double step_ = 1;
+  double start_value_ = 0, start_slope_ = 0;  // as far as they are known, per length scale
   double delta_value_ = 0, delta_slope_ = 0;
   bool conditioned_ = false;
-  const Factor* factor_ = nullptr;
-  Eigen::VectorXd modes_;
-  bool drawn_ = false;
+  Counters* counters_ = nullptr;
+  const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>* factor_ = nullptr;
+  std::vector<double> modes_;
+  std::vector<Node> nodes_;  // in increasing order
 };
 static_assert(LinePath<DensePath>);
 

@@ -5,6 +5,9 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include <chrono>
+#include <future>
+
 namespace gpis {
 namespace {
 
@@ -18,26 +21,34 @@ Counters for_each_hit(const ProcessSurface& surface, const FirstHitsQuery& query
   };
   tbb::enumerable_thread_specific<Worker> workers;
   tbb::task_arena arena(query.threads > 0 ? query.threads : tbb::task_arena::automatic);
-  arena.execute([&] {
-    tbb::parallel_for(
-        tbb::blocked_range<std::size_t>(0, query.rays.size(), 256), [&](const auto& range) {
-          Worker& worker = workers.local();
-          for (std::size_t i = range.begin(); i != range.end(); ++i) {
-            Rng rng(query.seed, query.first_index + i);
-            RealisationMemory fresh;
-            RealisationMemory* realisation = nullptr;
-            if (surface.memory() == Memory::global) {
-              realisation = realisations.empty() ? &fresh : &realisations[i];
-              if (query.realisation.empty()) realisation->seed = rng();
-            }
-            const Start start =
-                surface.start_from(query.start.empty() ? nullptr : &query.start[i], realisation);
-            const double t = surface.first_hit(worker.line, query.rays[i], query.t_max, start, rng,
-                                               worker.counters);
-            visit(i, worker.line, t, rng, worker.counters);
-          }
-        });
-  });
+  std::atomic<bool> stop = false;
+  const auto all = [&] {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, query.rays.size(), 256),
+                      [&](const auto& range) {
+                        Worker& worker = workers.local();
+                        worker.line.stop_when(&stop);
+                        for (std::size_t i = range.begin(); i != range.end() && !stop; ++i) {
+                          Rng rng(query.seed, query.first_index + i);
+                          RealisationMemory fresh;
+                          RealisationMemory* realisation = nullptr;
+                          if (surface.memory() == Memory::global) {
+                            realisation = realisations.empty() ? &fresh : &realisations[i];
+                            if (query.realisation.empty()) realisation->seed = rng();
+                          }
+                          const bool inside = !query.inside.empty() && query.inside[i];
+                          const Start start = surface.start_from(
+                              query.start.empty() ? nullptr : &query.start[i], inside, realisation);
+                          const double t = surface.first_hit(
+                              worker.line, query.rays[i], query.t_max, start, rng, worker.counters);
+                          visit(i, worker.line, t, rng, worker.counters);
+                        }
+                      });
+  };
+  // The calling thread only waits, so that it can be asked to stop.
+  auto work = std::async(std::launch::async, [&] { arena.execute(all); });
+  while (work.wait_for(std::chrono::milliseconds(50)) != std::future_status::ready)
+    if (query.interrupted && query.interrupted()) stop = true;
+  work.get();
   Counters total;
   for (const Worker& worker : workers) total.add(worker.counters);
   return total;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "core/counters.h"
@@ -17,8 +18,11 @@ struct FirstHitsQuery {
   std::vector<State>
       start;  // one a ray: rays that leave a surface point; empty: rays that come from outside
   std::vector<RealisationMemory> realisation;  // one a row, of memory `global`; empty: fresh ones
+  std::vector<char> inside;  // one a ray: those that travel inside the body; empty: none
   std::uint64_t seed = 0, first_index = 0;  // row i uses the random stream (seed, first_index + i)
   int threads = 0;                          // 0 = all cores
+  // Asked by the calling thread a few times a second; true ends all rays early, without hits.
+  std::function<bool()> interrupted;
 };
 
 struct FirstHits {

@@ -5,7 +5,7 @@
 #include <memory>
 #include <optional>
 
-#include "field/field.h"
+#include "field/tensor_field.h"
 #include "kernel/kernel.h"
 
 namespace gpis {
@@ -14,6 +14,9 @@ struct GaussianProcess {
   FieldPtr mean;
   FieldPtr sigma;  // standard deviation, never variance
   KernelPtr kernel;
+  // Squared length scales A(x), null where the kernel is stationary: its own length is then a
+  // factor on them.
+  TensorFieldPtr anisotropy;
   std::optional<Box3> bounds;  // outside there is no surface
   // Now, in temporal length scales: realisations of one seed at two times are correlated as
   // exp(-Δ²/2). None: the process does not change with time.
@@ -23,6 +26,6 @@ struct GaussianProcess {
 // What a ray that leaves a surface point remembers of the process (definitions B1-B4); `global`: a
 // path sees one realisation.
 enum class Memory { none, renewal, renewal_plus, global };
-enum class Sampler { automatic, convolution, dense, realisation };
+enum class Sampler { automatic, convolution, markov, spectral, nystrom, dense, realisation };
 
 }  // namespace gpis

@@ -11,6 +11,10 @@ namespace gpis {
 
 struct Line::Impl {
   LineGeometry geometry;  // object space
+  // What the path was drawn under: of -f for a ray that travels inside.
+  const PlannedLine* plan = nullptr;
+  bool inside = false;
+  const std::atomic<bool>* stop = nullptr;
 
   // Where the sample path begins: the first uncertain t.
   double anchor = 0;
@@ -21,7 +25,7 @@ struct Line::Impl {
   };
   std::vector<Stretch> stretches;
 
-  // The hit: fields and g by the piece and cell of the arriving side, dg per t.
+  // The hit, of f or -f: fields and g by the piece and cell of the arriving side, dg per t.
   double hit_t = kInfinity, hit_g = 0, hit_dg = 0;
   FieldSample hit_mean, hit_sigma;
 

@@ -26,7 +26,12 @@ class LineSampler {
 // One per path, in its own file. They throw a sentence where the path cannot serve the process.
 std::unique_ptr<LineSampler> make_zero(const GaussianProcess& process, const Box3& bounds);
 std::unique_ptr<LineSampler> make_convolution(const GaussianProcess& process, const Box3& bounds);
+std::unique_ptr<LineSampler> make_markov(const GaussianProcess& process, const Box3& bounds);
+std::unique_ptr<LineSampler> make_ornstein_uhlenbeck(const GaussianProcess& process, const Box3&);
+std::unique_ptr<LineSampler> make_spectral(const GaussianProcess& process, const Box3& bounds);
 std::unique_ptr<LineSampler> make_dense(const GaussianProcess& process, const Box3& bounds);
 std::unique_ptr<LineSampler> make_realisation(const GaussianProcess& process, const Box3& bounds);
+std::unique_ptr<LineSampler> make_nystrom(const GaussianProcess& process, const Box3& bounds);
+std::unique_ptr<LineSampler> make_joint_dense(const GaussianProcess& process, const Box3& bounds);
 
 }  // namespace gpis

@@ -64,6 +64,7 @@ class March {
 
     bool new_piece = false;
     for (int steps = 0; steps < kMaxSteps; ++steps) {
+      if (steps % kStepsToStop == kStepsToStop - 1 && line_.stop && *line_.stop) return kInfinity;
       b = step_end(a, t_end);
       last_cell_ = cell_;
       const double whole = std::min(cell_end(), t_end);
@@ -111,7 +112,7 @@ class March {
   }
 
  private:
-  static constexpr int kMaxSteps = 1 << 20;
+  static constexpr int kMaxSteps = 1 << 20, kStepsToStop = 1 << 12;
   static constexpr bool kBreaks = MeanLine::kBreaks || SigmaLine::kBreaks;
 
   // Derivatives per t.

@@ -40,8 +40,10 @@ class MarchSampler final : public LineSampler {
   typename Path::Plan plan_;
 };
 
-// Fields that renders hold often are marched under their concrete type.
-template <LinePath Path>
+// Fields that renders hold often are marched under their concrete type by the path that renders use
+// most; others spend their time in the path.
+enum class Fields { any, by_type };
+template <LinePath Path, Fields fields>
 std::unique_ptr<LineSampler> make_sampler(const GaussianProcess& process, const Box3& bounds) {
   typename Path::Plan plan(process, bounds);
   const auto make = [&]<class MeanLine, class SigmaLine>() -> std::unique_ptr<LineSampler> {
@@ -50,16 +52,19 @@ std::unique_ptr<LineSampler> make_sampler(const GaussianProcess& process, const 
   const Field* mean = process.mean.get();
   const Field* sigma = process.sigma.get();
   if (dynamic_cast<const ConstantField*>(sigma)) {
-    if (dynamic_cast<const ConstantField*>(mean))
-      return make.template operator()<ConstantLine, ConstantLine>();
-    if (dynamic_cast<const SphereField*>(mean))
-      return make.template operator()<SphereLine, ConstantLine>();
-    if (dynamic_cast<const GridField*>(mean))
-      return make.template operator()<GridLine, ConstantLine>();
+    if constexpr (fields == Fields::by_type) {
+      if (dynamic_cast<const ConstantField*>(mean))
+        return make.template operator()<ConstantLine, ConstantLine>();
+      if (dynamic_cast<const SphereField*>(mean))
+        return make.template operator()<SphereLine, ConstantLine>();
+      if (dynamic_cast<const GridField*>(mean))
+        return make.template operator()<GridLine, ConstantLine>();
+    }
     return make.template operator()<AnyLine, ConstantLine>();
   }
-  if (dynamic_cast<const GridField*>(sigma) && dynamic_cast<const GridField*>(mean))
-    return make.template operator()<GridLine, GridLine>();
+  if constexpr (fields == Fields::by_type)
+    if (dynamic_cast<const GridField*>(sigma) && dynamic_cast<const GridField*>(mean))
+      return make.template operator()<GridLine, GridLine>();
   return make.template operator()<AnyLine, AnyLine>();
 }
 

@@ -10,7 +10,8 @@
 //   start(known, …)                       g at the anchor is as remembered; also after start_free,
 //                                         which it then overrules (a draw that was not outside)
 //   prepare(cell, …)                      draws what the cell needs; increasing order, gaps allowed
-//   at_left, at_right, at                 g and its slope at the ends of a prepared cell and in it
+//   at_right, at                          g and its slope at the end of the last prepared cell,
+//                                         and anywhere in a prepared one
 //   gradient(t, g, dg, …)                 law of ∇g at t, given the path and g, g' there
 // Cell k is [anchor + k step, anchor + (k+1) step]. Paths that bridge draw in `at`, so it takes the
 // generator; whatever was drawn is kept, the same t gives the same g until the next reset.
@@ -75,7 +76,6 @@ concept LinePath =
   // For all t' >= t: how far below 0 the start may hold the mean of g (definitions B13).
   { drawn.pull(t) } -> std::same_as<double>;
   path.prepare(cell, rng, counters);
-  path.at_left(cell, out, out);
   path.at_right(cell, out, out);
   path.at(cell, t, rng, out, out);
   // c(h): between two evaluated points h apart, g differs from the cubic through both values

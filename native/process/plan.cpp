@@ -1,9 +1,12 @@
 #include "process/plan.h"
 
+#include <algorithm>
+
 #include "field/check.h"
 #include "field/constant_field.h"
 #include "field/scaled_field.h"
 #include "kernel/scaled_kernel.h"
+#include "process/covariance.h"
 #include "process/gaussian_process.h"
 #include "process/realisation.h"
 
@@ -24,6 +27,67 @@ std::shared_ptr<const GaussianProcess> normalised(std::shared_ptr<const Gaussian
   return out;
 }
 
+struct Choice {
+  std::unique_ptr<LineSampler> (*make)(const GaussianProcess&, const Box3&);
+  std::string reason;
+};
+
+Choice choose(const GaussianProcess& process, Sampler asked) {
+  const auto terms = process.kernel->terms();
+  const Radial* radial = nullptr;  // of the one term without wave, where that is all
+  if (!process.anisotropy && terms && terms->size() == 1 && length(terms->front().wave_vector) == 0)
+    radial = &terms->front().radial;
+  if (process.anisotropy &&
+      (asked == Sampler::convolution || asked == Sampler::markov || asked == Sampler::spectral))
+    refuse(
+        "this sampler serves length scales that are the same everywhere; with an anisotropy take "
+        "'auto', 'nystrom', 'dense' or 'realisation'.");
+  switch (asked) {
+    case Sampler::convolution:
+      return {make_convolution, "convolution: asked for"};
+    case Sampler::markov:
+      return {process.kernel->differentiable() ? make_markov : make_ornstein_uhlenbeck,
+              "markov: asked for"};
+    case Sampler::spectral:
+      return {make_spectral, "spectral: asked for"};
+    case Sampler::nystrom:
+      return {make_nystrom, "nystrom: asked for"};
+    case Sampler::dense:
+      // One factor serves all lines of one radial correlation.
+      return {radial ? make_dense : make_joint_dense, "dense: asked for"};
+    case Sampler::realisation:
+      return {make_realisation,
+              "realisation: " + Realisation(process, Realisation::Access::rays).describe()};
+    case Sampler::automatic:
+      break;
+  }
+  if (radial) {
+    if (radial->family == Radial::Family::squared_exponential)
+      return {make_convolution, "convolution: stationary squared exponential"};
+    if (!radial->differentiable())
+      return {make_ornstein_uhlenbeck, "markov: first passage by its bridges, no gradients"};
+    if (radial->markov())
+      return {make_markov, "markov: a state of value and slopes carries the line exactly"};
+  }
+  const auto smooth = [](const Term& term) { return term.radial.smooth(); };
+  if (!process.anisotropy && terms && std::all_of(terms->begin(), terms->end(), smooth))
+    return {make_spectral, "spectral: a sum of smooth terms"};
+  const std::string why = process.anisotropy
+                              ? "length scales vary, lines are drawn from their own covariance"
+                              : "no other sampler serves " + process.kernel->describe();
+  if (Covariance(process).smooth()) return {make_nystrom, "nystrom: " + why};
+  return {make_joint_dense, "dense: " + why};
+}
+
+// A bound on the standard deviation of ∂_d g over all directions, for a length scale of 1 in A(x).
+double steepest(const Kernel& kernel) {
+  const Mat3 g = kernel.derivative_covariance();
+  double most = 0;
+  for (const Vec3& row : g.row)
+    most = std::max(most, std::abs(row.x) + std::abs(row.y) + std::abs(row.z));
+  return std::sqrt(most);
+}
+
 Box3 everywhere() {
   return {{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
 }
@@ -38,6 +102,15 @@ Box3 intersection(const Box3& a, const Box3& b) {
 }
 
 }  // namespace
+
+std::shared_ptr<const GaussianProcess> inside_out(const GaussianProcess& process) {
+  auto out = std::make_shared<GaussianProcess>(process);
+  if (const auto* constant = dynamic_cast<const ConstantField*>(process.mean.get()))
+    out->mean = std::make_shared<ConstantField>(-constant->value({}));
+  else
+    out->mean = std::make_shared<ScaledField>(process.mean, -1.0);
+  return out;
+}
 
 PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Sampler sampler,
                       double missed_root) {
@@ -67,11 +140,20 @@ PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Sampler sa
   // Rice: a crossing where μ > zσ on a length L has probability below L√λ₂/(2πℓ) e^{-z²/2} <= ε/2
   // (definitions B13).
   const double diagonal = length(plan.bounds.max - plan.bounds.min);
-  const double shortest = process->kernel->min_length_scale();
+  double shortest = process->kernel->min_length_scale(), factor = 1;
+  if (process->anisotropy) factor = std::sqrt(process->anisotropy->eigenvalues().min);
+  shortest *= factor;
   const double lengths = std::isfinite(diagonal) ? diagonal / shortest : 1e4;
-  plan.skip_deviations =
-      std::sqrt(std::max(16.0, 2 * std::log(std::max(1.0, lengths) / (kPi * missed_root))));
+  // A path without slope comes to some 30 crossings a length scale, its excursions above z = 4 to 8
+  // counted.
+  const double rate =
+      process->kernel->differentiable() ? steepest(*process->kernel) / factor : 30 / shortest;
+  const double span = std::isfinite(diagonal) ? diagonal : 1e4 * shortest;
+  const double crossings = rate > 0 ? std::max(1.0, rate * span) : 1;
+  plan.skip_deviations = std::sqrt(std::max(16.0, 2 * std::log(crossings / (kPi * missed_root))));
   plan.sigma_max = sigma.max;
+  // Two to four cells of the path a length scale.
+  plan.steps = std::isfinite(diagonal) ? 4 * lengths : 0;
   // A certain surface (σ = 0) still needs a last step across it: stop a little before the root.
   const double scale = std::min(shortest, std::isfinite(diagonal) ? diagonal : 1.0);
   plan.skip_threshold = std::max(plan.skip_deviations * sigma.max, 1e-4 * scale);
@@ -81,18 +163,10 @@ PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Sampler sa
   if (sigma.max == 0) {
     plan.line_sampler = make_zero(*process, plan.bounds);
     plan.sampler_reason = "none: sigma is 0, the surface is the mean itself";
-  } else if (sampler == Sampler::dense) {
-    plan.line_sampler = make_dense(*process, plan.bounds);
-    plan.sampler_reason = "dense: asked for";
-  } else if (sampler == Sampler::realisation) {
-    plan.line_sampler = make_realisation(*process, plan.bounds);
-    plan.sampler_reason =
-        "realisation: " + Realisation(*process->kernel, Realisation::Access::rays).describe();
   } else {
-    plan.line_sampler = make_convolution(*process, plan.bounds);
-    plan.sampler_reason = sampler == Sampler::convolution
-                              ? "convolution: asked for"
-                              : "convolution: stationary squared exponential";
+    const Choice choice = choose(*process, sampler);
+    plan.line_sampler = choice.make(*process, plan.bounds);
+    plan.sampler_reason = choice.reason;
   }
   plan.process = std::move(process);
   return plan;

@@ -17,10 +17,14 @@ struct PlannedLine {
   double skip_deviations = 0;  // the same in standard deviations
   double smooth_scale = kInfinity;
   double mean_lipschitz = kInfinity, sigma_lipschitz = kInfinity;
-  Box3 bounds;  // object space; outside there is no surface
+  Box3 bounds;       // object space; outside there is no surface
+  double steps = 0;  // of a ray across the bounds, should all of it be uncertain; 0: unbounded
   std::unique_ptr<const LineSampler> line_sampler;
   std::string sampler_reason;
 };
+
+// The process of -f: rays inside the body march it as others march f (definitions B7).
+std::shared_ptr<const GaussianProcess> inside_out(const GaussianProcess& process);
 
 // Throws std::invalid_argument with a sentence where the process cannot be rendered.
 PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Sampler sampler,

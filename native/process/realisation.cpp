@@ -1,6 +1,7 @@
 #include "process/realisation.h"
 
 #include "field/check.h"
+#include "process/covariance.h"
 
 namespace gpis {
 
@@ -11,11 +12,18 @@ bool on_lattice(const Term& term) {
          term.radial.family == Radial::Family::constant;
 }
 
-std::vector<Term> terms_of(const Kernel& kernel) {
-  if (auto terms = kernel.terms()) return *std::move(terms);
-  refuse("A realisation takes a kernel that is a sum of stationary terms; ", kernel.describe(),
-         " is a product without such a form. Multiply by squared exponentials and plane waves "
-         "only.");
+std::vector<Term> terms_of(const GaussianProcess& process) {
+  const Kernel& kernel = *process.kernel;
+  const auto terms = kernel.terms();
+  if (!terms)
+    refuse("A realisation takes a kernel that is a sum of stationary terms; ", kernel.describe(),
+           " is a product without such a form. Multiply by squared exponentials and plane waves "
+           "only.");
+  if (!process.anisotropy) return *terms;
+  if (terms->size() != 1 || terms->front().radial.family != Radial::Family::squared_exponential)
+    refuse("A realisation under an anisotropy takes the squared exponential, not ",
+           kernel.describe(), ".");
+  return {};  // the lattice under the anisotropy is made apart
 }
 
 std::vector<LatticeField> lattice_fields(const std::vector<Term>& terms) {
@@ -37,15 +45,21 @@ int count_lattices(const std::vector<LatticeField>& fields) {
 
 }  // namespace
 
-Realisation::Realisation(const Kernel& kernel, Access access)
-    : lattices_(lattice_fields(terms_of(kernel))),
+Realisation::Realisation(const GaussianProcess& process, Access access)
+    : lattices_(lattice_fields(terms_of(process))),
       noise_(access == Access::rays ? LatticeNoise::Cache{{3, 3, 3}, count_lattices(lattices_)}
                                     // 2 MB a lattice
                                     : LatticeNoise::Cache{{6, 4, 4}, 1}) {
   // Numbers apart from those of the lattices: independent streams.
   int number = 1 << 20;
-  for (const Term& term : terms_of(kernel))
+  for (const Term& term : terms_of(process))
     if (!on_lattice(term)) spectra_.emplace_back(term, number++);
+  if (process.anisotropy) {
+    const Covariance checks_kernel(process);
+    const Term term = process.kernel->terms()->front();
+    varying_.emplace(process.anisotropy, 1 / term.max_inverse_length(), 0);
+    varying_scale_ = std::sqrt(term.weight);
+  }
 }
 
 void Realisation::draw(std::uint64_t seed, std::optional<double> time) {
@@ -61,6 +75,11 @@ FieldSample Realisation::sample(const Vec3& x) {
   FieldSample g;
   for (LatticeField& field : lattices_) field.add(noise_, x, g);
   for (SpectralField& field : spectra_) field.add(x, g);
+  if (varying_) {
+    const FieldSample varying = varying_->sample(noise_, x);
+    g.value += varying_scale_ * varying.value;
+    g.gradient += varying.gradient * varying_scale_;
+  }
   return g;
 }
 
@@ -74,6 +93,10 @@ void Realisation::on_line(double t, double& g, double& dg) {
   const Vec3 x = origin_ + direction_ * t;
   FieldSample sample;
   for (LatticeField& field : lattices_) field.add(noise_, x, sample);
+  if (varying_) {
+    sample = varying_->sample(noise_, x);
+    sample = {sample.value * varying_scale_, sample.gradient * varying_scale_};
+  }
   g = sample.value;
   dg = dot(sample.gradient, direction_);
   for (SpectralField& field : spectra_) field.add_on_line(t, g, dg);
@@ -84,6 +107,8 @@ double Realisation::fourth_derivative() const {
   for (const LatticeField& field : lattices_)
     variance += field.fourth_derivative_variance(direction_);
   for (const SpectralField& field : spectra_) variance += field.fourth_derivative_variance();
+  if (varying_)
+    variance += varying_scale_ * varying_scale_ * varying_->fourth_derivative_variance(direction_);
   return std::sqrt(variance);
 }
 
@@ -92,6 +117,8 @@ double Realisation::expected_fourth_derivative(const Vec3& d) const {
   for (const LatticeField& field : lattices_) variance += field.fourth_derivative_variance(d);
   for (const SpectralField& field : spectra_)
     variance += field.expected_fourth_derivative_variance(d);
+  if (varying_)
+    variance += varying_scale_ * varying_scale_ * varying_->fourth_derivative_variance(d);
   return std::sqrt(variance);
 }
 
@@ -109,6 +136,14 @@ void Realisation::fill(const Vec3& origin, double spacing, const std::array<int,
                        row_.data());
         for (int k = 0; k < size[2]; ++k) row(i, j)[k] += static_cast<float>(row_[k]);
       }
+  if (varying_)
+    for (int j = 0; j < size[1]; ++j)
+      for (int i = 0; i < size[0]; ++i)
+        for (int k = 0; k < size[2]; ++k)
+          row(i, j)[k] = static_cast<float>(
+              varying_scale_ *
+              varying_->sample(noise_, origin + Vec3{double(i), double(j), double(k)} * spacing)
+                  .value);
   for (SpectralField& field : spectra_)
     for (int i = 0; i < size[0]; ++i)
       field.add_slice(origin + Vec3{i * spacing, 0, 0}, spacing, size[1], size[2], row(i, 0));
@@ -117,6 +152,9 @@ void Realisation::fill(const Vec3& origin, double spacing, const std::array<int,
 std::string Realisation::describe() const {
   std::ostringstream text;
   const int lattices = count_lattices(lattices_);
+  if (varying_)
+    return "a lattice of white noise under length scales that vary, exactly Gaussian, correlation "
+           "exact to 3e-7";
   if (lattices > 0)
     text << lattices << (lattices == 1 ? " lattice" : " lattices")
          << " of white noise, exactly Gaussian, correlation exact to 3e-7";

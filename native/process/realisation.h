@@ -1,13 +1,16 @@
 // Sampler 6: one sample of g in all of space, with values and gradients at any point in any order
 // (math.md §5.6): the ground truth for the samplers of lines, the memory `global`, and grids for
 // people to look at. A sum of independent parts, one for each term of the kernel's normal form:
-// lattice convolution for squared-exponential and constant terms, random spectral features for the
-// others.
+// lattice convolution for squared-exponential and constant terms, also under a field of length
+// scales, random spectral features for the others.
 #pragma once
 
-#include "core/counters.h"
+#include <memory>
+
+#include "process/gaussian_process.h"
 #include "process/lattice_field.h"
 #include "process/spectral_field.h"
+#include "process/varying_lattice.h"
 
 namespace gpis {
 
@@ -15,8 +18,8 @@ class Realisation {
  public:
   // Where it will be asked for next: close to the last point, on rays, or on whole rows of a grid.
   enum class Access { rays, rows };
-  // Throws std::invalid_argument where the kernel has no normal form.
-  Realisation(const Kernel& kernel, Access access);
+  // Throws std::invalid_argument where the kernel has no normal form, or none under its anisotropy.
+  Realisation(const GaussianProcess& process, Access access);
 
   // Another realisation, a pure function of (seed, time). `time` in temporal length scales: the
   // realisations of one seed at two times are correlated as exp(-Δ²/2).
@@ -42,6 +45,8 @@ class Realisation {
 
  private:
   std::vector<LatticeField> lattices_;
+  std::optional<VaryingLattice> varying_;
+  double varying_scale_ = 1;
   std::vector<SpectralField> spectra_;
   LatticeNoise noise_;
   std::uint64_t seed_ = 0, spectral_normals_ = 0;

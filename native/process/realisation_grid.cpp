@@ -51,7 +51,7 @@ std::optional<RealisationGrid> realise(const GaussianProcess& process,
     std::vector<float> g;
   };
   tbb::enumerable_thread_specific<Worker> workers([&] {
-    Worker worker{Realisation(*process.kernel, Realisation::Access::rows), {}};
+    Worker worker{Realisation(process, Realisation::Access::rows), {}};
     worker.realisation.draw(query.seed, process.time);
     return worker;
   });
@@ -85,7 +85,7 @@ std::vector<FieldSample> realise_at(const GaussianProcess& process, const std::v
                                     std::uint64_t seed, int count, int threads) {
   std::vector<FieldSample> out(points.size() * count);
   tbb::enumerable_thread_specific<Realisation> workers(
-      [&] { return Realisation(*process.kernel, Realisation::Access::rays); });
+      [&] { return Realisation(process, Realisation::Access::rays); });
   tbb::task_arena(arena_of(threads)).execute([&] {
     tbb::parallel_for(0, count, [&](int n) {
       Realisation& realisation = workers.local();

@@ -4,23 +4,22 @@
 #include <cstdint>
 
 #include "field/field.h"
-#include "kernel/kernel.h"
+#include "process/covariance.h"
 
 namespace gpis {
 
-// g made to have given values at one point, by Matheron's rule (math.md §3): g(x) += value ·
-// cov(g(x), g(at)) + Σ_j slope_j · cov(g(x), ∂_j g(at)).
+// g made to have given values at one point, by Matheron's rule (math.md §3): g(x) += the covariance
+// of g(x) with the functional weight.value g + weight.slope · ∇g at that point.
 struct RealisationCondition {
   bool active = false;
   Vec3 at;
-  double value = 0;
-  Vec3 slope;
+  Functional weight;
 
-  void add(const Kernel& kernel, const Vec3& x, FieldSample& g) const {
+  void add(const Covariance& covariance, const Vec3& x, FieldSample& g) const {
     if (!active) return;
-    const Vec3 r = x - at, gradient = kernel.gradient(r);
-    g.value += value * kernel.covariance(r) - dot(slope, gradient);
-    g.gradient += gradient * value + kernel.mixed(r) * slope;
+    const Eigen::Vector4d c = covariance.cross(covariance.at(x), covariance.at(at), weight);
+    g.value += c[0];
+    g.gradient += Vec3{c[1], c[2], c[3]};
   }
 };
 

@@ -26,14 +26,11 @@ Mat3 pseudo_inverse(const Mat3& m) {
 
 }  // namespace
 
-RealisationPath::Plan::Plan(const GaussianProcess& process, const Box3&)
-    : kernel(process.kernel), time(process.time), variance(process.kernel->variance()) {
-  if (!kernel->differentiable())
-    refuse("The kernel ", kernel->describe(),
+RealisationPath::Plan::Plan(const GaussianProcess& p, const Box3&)
+    : process(std::make_shared<GaussianProcess>(p)), covariance(std::make_shared<Covariance>(p)) {
+  if (!covariance->differentiable())
+    refuse("The kernel ", p.kernel->describe(),
            " has no gradient: the realisation sampler cannot find its surface.");
-  description = Realisation(*kernel, Realisation::Access::rays).describe();
-  derivative_covariance = kernel->derivative_covariance();
-  inverse_derivative_covariance = pseudo_inverse(derivative_covariance);
 }
 
 void RealisationPath::reset(const Plan& plan, const LineGeometry& line, double anchor, double,
@@ -49,7 +46,7 @@ void RealisationPath::reset(const Plan& plan, const LineGeometry& line, double a
     if (entry.plan == &plan) realisation_ = entry.realisation.get();
   if (!realisation_) {
     pool_.push_back(
-        {&plan, std::make_unique<Realisation>(*plan.kernel, Realisation::Access::rays)});
+        {&plan, std::make_unique<Realisation>(*plan.process, Realisation::Access::rays)});
     realisation_ = pool_.back().realisation.get();
   }
   counted_ = realisation_->normals();
@@ -62,7 +59,7 @@ void RealisationPath::reset(const Plan& plan, const LineGeometry& line, double a
 void RealisationPath::draw(Rng& rng, Counters& counters) {
   if (drawn_) return;
   drawn_ = true;
-  realisation_->draw(kept_ ? kept_->seed : rng(), plan_->time);
+  realisation_->draw(kept_ ? kept_->seed : rng(), plan_->process->time);
   if (kept_) entry_ = kept_->entry;
   realisation_->set_line(line_.origin, line_.direction);
   // The cubic is off by u²(h-u)² |g''''| / 24 <= (4/3)(B₁+B₂) (h/2)⁴ |g''''| / 24; 4.5 standard
@@ -76,9 +73,19 @@ void RealisationPath::count(Counters& counters) {
   counted_ = realisation_->normals();
 }
 
+// G = Cov ∇g at a point (definitions E3).
+Mat3 RealisationPath::derivative_covariance(const Vec3& x) const {
+  const LocalPoint at = plan_->covariance->at(x);
+  const Eigen::Matrix4d block = plan_->covariance->block(at, at);
+  Mat3 g;
+  for (int i = 0; i < 3; ++i) g.row[i] = {block(1 + i, 1), block(1 + i, 2), block(1 + i, 3)};
+  return g;
+}
+
 void RealisationPath::slope_law(double, double& mean, double& deviation) const {
+  const Vec3& d = line_.direction;
   mean = 0;
-  deviation = std::sqrt(dot(line_.direction, plan_->derivative_covariance * line_.direction));
+  deviation = std::sqrt(dot(d, derivative_covariance(point(anchor_)) * d));
 }
 
 void RealisationPath::start_free(Rng& rng, Counters& counters, double& g, double& dg) {
@@ -112,36 +119,39 @@ double RealisationPath::start(const PathStart& known, Rng& rng, Counters& counte
   return dg;
 }
 
-// The value and the slopes at one point are independent under a stationary kernel.
+// The value and the slopes at one point are independent: the variance is the same everywhere.
 RealisationCondition RealisationPath::condition(const PathStart& known) const {
-  RealisationCondition out{true, point(anchor_), 0, {}};
+  RealisationCondition out{true, point(anchor_), {0, {}}};
   const FieldSample now = sample(out.at);
-  out.value = (known.value - now.value) / plan_->variance;
+  // Of g itself, which a ray inside the body sees reversed.
+  out.weight.value = sign_ * (known.value - now.value) / plan_->covariance->variance();
+  if (!known.slope_known) return out;
+  const Mat3 g = derivative_covariance(out.at);
   if (known.gradient_known) {
-    out.slope = plan_->inverse_derivative_covariance * (known.gradient - now.gradient);
-  } else if (known.slope_known) {
+    out.weight.slope = pseudo_inverse(g) * (known.gradient - now.gradient) * sign_;
+  } else {
     const Vec3& d = line_.direction;
-    const double variance = dot(d, plan_->derivative_covariance * d);
-    if (variance > 0) out.slope = d * ((known.slope - dot(now.gradient, d)) / variance);
+    const double variance = dot(d, g * d);
+    if (variance > 0)
+      out.weight.slope = d * (sign_ * (known.slope - dot(now.gradient, d)) / variance);
   }
   return out;
 }
 
 FieldSample RealisationPath::sample(const Vec3& x) const {
   FieldSample g = realisation_->sample(x);
-  entry_.add(*plan_->kernel, x, g);
-  own_.add(*plan_->kernel, x, g);
-  return g;
+  entry_.add(*plan_->covariance, x, g);
+  own_.add(*plan_->covariance, x, g);
+  return {sign_ * g.value, g.gradient * sign_};
 }
 
 void RealisationPath::evaluate(double t, double& g, double& dg) {
   realisation_->on_line(t, g, dg);
-  if (!entry_.active && !own_.active) return;
   FieldSample moved;
-  entry_.add(*plan_->kernel, point(t), moved);
-  own_.add(*plan_->kernel, point(t), moved);
-  g += moved.value;
-  dg += dot(moved.gradient, line_.direction);
+  entry_.add(*plan_->covariance, point(t), moved);
+  own_.add(*plan_->covariance, point(t), moved);
+  g = sign_ * (g + moved.value);
+  dg = sign_ * (dg + dot(moved.gradient, line_.direction));
 }
 
 PathGradient RealisationPath::gradient(double t, double, double, Rng&) {
@@ -149,7 +159,7 @@ PathGradient RealisationPath::gradient(double t, double, double, Rng&) {
 }
 
 std::unique_ptr<LineSampler> make_realisation(const GaussianProcess& process, const Box3& bounds) {
-  return make_sampler<RealisationPath>(process, bounds);
+  return make_sampler<RealisationPath, Fields::any>(process, bounds);
 }
 
 }  // namespace gpis

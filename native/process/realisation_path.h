@@ -19,26 +19,26 @@ class RealisationPath {
     Plan(const GaussianProcess& process, const Box3& bounds);
     // Of lattices; spectral features have the exact covariance.
     double correlation_error = 3e-7;
-    KernelPtr kernel;
-    std::optional<double> time;
-    double variance;
-    Mat3 derivative_covariance, inverse_derivative_covariance;
-    std::string description;
+    std::shared_ptr<const GaussianProcess> process;
+    std::shared_ptr<const Covariance> covariance;
   };
 
-  // The lines from here on are drawn from this realisation; null: from a fresh one each.
-  void keep(RealisationMemory* kept) { kept_ = kept; }
+  // The lines from here on are drawn from this realisation; null: from a fresh one each. `inside`:
+  // of a ray inside the body, which sees -f and so -g.
+  void keep(RealisationMemory* kept, bool inside) {
+    kept_ = kept;
+    sign_ = inside && kept ? -1 : 1;
+  }
 
   void reset(const Plan& plan, const LineGeometry& line, double anchor, double t_end,
              Counters& counters);
   double step() const { return step_; }
-  double value_deviation() const { return std::sqrt(plan_->variance); }
+  double value_deviation() const { return std::sqrt(plan_->covariance->variance()); }
   void slope_law(double, double& mean, double& deviation) const;
   void start_free(Rng& rng, Counters& counters, double& g, double& dg);
   double start(const PathStart& known, Rng& rng, Counters& counters);
   double pull(double) const { return pull_; }
   void prepare(long, Rng&, Counters& counters) { count(counters); }
-  void at_left(long cell, double& g, double& dg) { evaluate(anchor_ + cell * step_, g, dg); }
   void at_right(long cell, double& g, double& dg) { evaluate(anchor_ + (cell + 1) * step_, g, dg); }
   void at(long, double t, Rng&, double& g, double& dg) { evaluate(t, g, dg); }
   double deviation(double h) const { return deviation_ * (h * h) * (h * h); }
@@ -55,12 +55,14 @@ class RealisationPath {
   void count(Counters& counters);
   RealisationCondition condition(const PathStart& known) const;
   void evaluate(double t, double& g, double& dg);
+  Mat3 derivative_covariance(const Vec3& x) const;
   Vec3 point(double t) const { return line_.origin + line_.direction * t; }
 
   const Plan* plan_ = nullptr;
   std::vector<Pool> pool_;  // one for each object that this line was used for
   Realisation* realisation_ = nullptr;
   RealisationMemory* kept_ = nullptr;
+  double sign_ = 1;
   LineGeometry line_;
   double anchor_ = 0, step_ = 1, deviation_ = 0, pull_ = 0;
   bool drawn_ = false;

@@ -13,6 +13,9 @@ Line::Line() : impl_(std::make_unique<Impl>()) {}
 Line::~Line() = default;
 Line::Line(Line&&) noexcept = default;
 Line& Line::operator=(Line&&) noexcept = default;
+void Line::stop_when(const std::atomic<bool>* stop) {
+  impl_->stop = stop;
+}
 
 namespace {
 
@@ -32,8 +35,10 @@ ProcessSurface::ProcessSurface(std::shared_ptr<const GaussianProcess> process,
                                double missed_root)
     : object_to_world_(object_to_world),
       memory_(memory),
-      planned_(std::make_shared<PlannedLine>(
-          plan_line(std::move(process), sampler_for(memory, sampler), missed_root))) {
+      sampler_(sampler_for(memory, sampler)),
+      missed_root_(missed_root),
+      planned_(
+          std::make_shared<PlannedLine>(plan_line(std::move(process), sampler_, missed_root))) {
   const double volume = determinant(object_to_world.linear);
   if (!std::isfinite(volume) || std::abs(volume) < 1e-300)
     throw std::invalid_argument(
@@ -51,11 +56,22 @@ ProcessSurface::ProcessSurface(std::shared_ptr<const GaussianProcess> process,
   }
 }
 
+void ProcessSurface::serve_inside() {
+  if (planned_inside_) return;
+  if (memory_ == Memory::global)
+    throw std::invalid_argument(
+        "Rays inside a body do not know memory 'global': take 'renewal+', 'renewal' or 'none'.");
+  planned_inside_ = std::make_shared<PlannedLine>(
+      plan_line(inside_out(*planned_->process), sampler_, missed_root_));
+}
+
 double ProcessSurface::first_hit(Line& line, const Ray& ray, double t_max, const Start& start,
                                  Rng& rng, Counters& counters) const {
   Line::Impl& l = line.impl();
   l.stretches.clear();
   l.hit_t = kInfinity;
+  l.inside = start.inside;
+  l.plan = start.inside ? planned_inside_.get() : planned_.get();
   const auto& [origin, direction] =
       l.geometry = {world_to_object_.point(ray.origin), world_to_object_.vector(ray.direction)};
   auto [t_begin, t_end] = clip(planned_->bounds, origin, direction, 0, t_max);
@@ -65,10 +81,11 @@ double ProcessSurface::first_hit(Line& line, const Ray& ray, double t_max, const
     ++counters.line_skipped;
     return kInfinity;
   }
-  if (memory_ == Memory::global) l.path<RealisationPath>().keep(start.realisation);
-  const double t =
-      planned_->line_sampler->first_hit(*planned_, l, t_begin, t_end, start, rng, counters);
-  if (memory_ == Memory::global) l.path<RealisationPath>().keep(nullptr);
+  if (memory_ == Memory::global) l.path<RealisationPath>().keep(start.realisation, start.inside);
+  Start seen = start;
+  if (start.inside) seen.state = {-start.state.value, -start.state.gradient};
+  const double t = l.plan->line_sampler->first_hit(*l.plan, l, t_begin, t_end, seen, rng, counters);
+  if (memory_ == Memory::global) l.path<RealisationPath>().keep(nullptr, false);
   return t;
 }
 
@@ -82,9 +99,10 @@ double ProcessSurface::value(Line& line, double t, Rng& rng) const {
   Line::Impl& l = line.impl();
   if (t == l.hit_t) return 0;
   double g, dg;
-  planned_->line_sampler->path_at(l, t, rng, g, dg);
+  l.plan->line_sampler->path_at(l, t, rng, g, dg);
   const Vec3 p = l.geometry.origin + l.geometry.direction * t;
-  return planned_->process->mean->value(p) + planned_->process->sigma->value(p) * g;
+  const double f = l.plan->process->mean->value(p) + l.plan->process->sigma->value(p) * g;
+  return l.inside ? -f : f;
 }
 
 GradientLaw ProcessSurface::gradient_law(Line& line, double t, Rng& rng) const {
@@ -98,17 +116,18 @@ GradientLaw ProcessSurface::gradient_law(Line& line, double t, Rng& rng) const {
     dg = l.hit_dg;
   } else {
     const Vec3 p = l.geometry.origin + l.geometry.direction * t;
-    mean = planned_->process->mean->sample(p);
-    sigma = planned_->process->sigma->sample(p);
-    planned_->line_sampler->path_at(l, t, rng, g, dg);
+    mean = l.plan->process->mean->sample(p);
+    sigma = l.plan->process->sigma->sample(p);
+    l.plan->line_sampler->path_at(l, t, rng, g, dg);
   }
   // ∇f = ∇μ + g∇σ + σ∇g (math.md §2).
-  const PathGradient path = planned_->line_sampler->gradient(l, t, g, dg, rng);
+  const PathGradient path = l.plan->line_sampler->gradient(l, t, g, dg, rng);
   const Mat3 to_world = transpose(world_to_object_.linear);
   GradientLaw law;
   law.mean = to_world * (mean.gradient + sigma.gradient * g + path.mean * sigma.value);
   law.b1 = to_world * (path.b1 * sigma.value);
   law.b2 = to_world * (path.b2 * sigma.value);
+  if (l.inside) law = {-law.mean, -law.b1, -law.b2};
   // The smaller axis of the spread: one below a millionth of the gradient (σ falling to 0, a short
   // flight, a kernel that is constant along an axis) has no density worth the name.
   const double area2 = dot(cross(law.b1, law.b2), cross(law.b1, law.b2));
@@ -126,15 +145,17 @@ Vec3 ProcessSurface::world_gradient(const State& state) const {
   return transpose(world_to_object_.linear) * state.gradient;
 }
 
-Start ProcessSurface::start_from(const State* remembered, RealisationMemory* realisation) const {
-  if (!remembered) return {Start::Kind::outside, {}, realisation};
+Start ProcessSurface::start_from(const State* remembered, bool inside,
+                                 RealisationMemory* realisation) const {
+  const Start fresh{Start::Kind::outside, {}, inside, realisation};
+  if (!remembered) return fresh;
   // A certain surface has nothing to forget (B2): the ray starts on it and leaves along its
   // gradient.
   if (planned_->sigma_max == 0 || memory_ == Memory::global)
-    return {Start::Kind::value_slope, *remembered, realisation};
-  if (memory_ == Memory::none) return {};
-  if (memory_ == Memory::renewal) return {Start::Kind::value, *remembered};
-  return {Start::Kind::value_slope, *remembered};
+    return {Start::Kind::value_slope, *remembered, inside, realisation};
+  if (memory_ == Memory::none) return fresh;
+  if (memory_ == Memory::renewal) return {Start::Kind::value, *remembered, inside, realisation};
+  return {Start::Kind::value_slope, *remembered, inside, realisation};
 }
 
 std::vector<std::pair<std::string, std::string>> ProcessSurface::plan() const {
@@ -146,8 +167,9 @@ std::vector<std::pair<std::string, std::string>> ProcessSurface::plan() const {
   const char* memories[] = {"none", "renewal", "renewal+",
                             "global: one realisation for the whole path and its shadow rays"};
   const Range sigma = planned_->process->sigma->range();
-  std::vector<std::pair<std::string, std::string>> rows{
+  std::vector<std::pair<std::string, std::string>> facts = {
       {"sampler", planned_->sampler_reason},
+      {"correlation_error", number(planned_->line_sampler->correlation_error())},
       {"memory", memories[static_cast<int>(memory_)]},
       {"sigma", sigma.min == sigma.max
                     ? "constant " + number(sigma.min)
@@ -156,11 +178,17 @@ std::vector<std::pair<std::string, std::string>> ProcessSurface::plan() const {
                                number(planned_->skip_deviations) +
                                " standard deviations): nothing is drawn"}};
   if (planned_->process->time)
-    rows.push_back({"time", "now " + number(*planned_->process->time) +
-                                " time scales: a realisation (memory global, gp.realisation) flows "
-                                "from frame to frame under one seed; the other memories draw "
-                                "every path anew, whose expectation does not change with time"});
-  return rows;
+    facts.push_back(
+        {"time", "now " + number(*planned_->process->time) +
+                     " time scales: a realisation (memory global, gp.realisation) flows "
+                     "from frame to frame under one seed; the other memories draw "
+                     "every path anew, whose expectation does not change with time"});
+  if (planned_->steps > 1e5)
+    facts.emplace_back("warning",
+                       "A ray across the bounds may take " + number(planned_->steps) +
+                           " steps: the length scale is tiny against them. Take a longer "
+                           "length_scale or smaller bounds.");
+  return facts;
 }
 
 }  // namespace gpis

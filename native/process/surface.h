@@ -4,7 +4,7 @@
 // to object space without normalising its direction, B12).
 #pragma once
 
-#include <functional>
+#include <atomic>
 #include <memory>
 #include <vector>
 
@@ -33,6 +33,8 @@ struct Start {
   };
   Kind kind = Kind::outside;
   State state;
+  // The ray travels inside the body (dielectrics): the same laws for -f (definitions B7).
+  bool inside = false;
   // The realisation that the ray is to see; null: a fresh path. Memory `global` alone, which takes
   // note here where the path entered it.
   RealisationMemory* realisation = nullptr;
@@ -61,6 +63,9 @@ class Line {
   Line(Line&&) noexcept;
   Line& operator=(Line&&) noexcept;
 
+  // Rays end, with no hit, soon after *stop becomes true: what they found is then to be dropped.
+  void stop_when(const std::atomic<bool>* stop);
+
   struct Impl;
   Impl& impl() { return *impl_; }
   const Impl& impl() const { return *impl_; }
@@ -76,11 +81,15 @@ class ProcessSurface {
   ProcessSurface(std::shared_ptr<const GaussianProcess> process, const Affine& object_to_world,
                  Memory memory, Sampler sampler, double missed_root);
 
+  // Plans rays that travel inside the body too; before the first of them.
+  void serve_inside();
+
   Memory memory() const { return memory_; }
   // World-space box outside of which there is certainly no surface (infinite where unbounded).
   const Box3& bounds() const { return world_bounds_; }
 
-  // The first t in (0, t_max) where f changes to f <= 0, infinity if there is none. `line` holds
+  // The first t in (0, t_max) where f changes to f <= 0 (inside: to f >= 0), infinity if there is
+  // none. `line` holds
   // the sample path afterwards. `ray.direction` has unit length.
   double first_hit(Line& line, const Ray& ray, double t_max, const Start& start, Rng& rng,
                    Counters& counters) const;
@@ -101,7 +110,8 @@ class ProcessSurface {
 
   // The start of a ray that leaves a point with this remembered state, under this object's memory
   // model.
-  Start start_from(const State* remembered, RealisationMemory* realisation = nullptr) const;
+  Start start_from(const State* remembered, bool inside = false,
+                   RealisationMemory* realisation = nullptr) const;
 
   // Human-readable facts for scene.plan().
   std::vector<std::pair<std::string, std::string>> plan() const;
@@ -110,7 +120,9 @@ class ProcessSurface {
   Affine object_to_world_, world_to_object_;
   Memory memory_;
   Box3 world_bounds_;
-  std::shared_ptr<const PlannedLine> planned_;
+  Sampler sampler_;
+  double missed_root_;
+  std::shared_ptr<const PlannedLine> planned_, planned_inside_;
 };
 
 // Random starts (also used by tests): N(0,1) truncated to (a, ∞), and the flux-weighted normal z ~

@@ -5,7 +5,7 @@
 namespace gpis {
 
 std::unique_ptr<LineSampler> make_zero(const GaussianProcess& process, const Box3& bounds) {
-  return make_sampler<ZeroPath>(process, bounds);
+  return make_sampler<ZeroPath, Fields::by_type>(process, bounds);
 }
 
 }  // namespace gpis

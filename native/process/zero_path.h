@@ -27,7 +27,6 @@ class ZeroPath {
   double start(const PathStart&, Rng&, Counters&) { return 0; }
   double pull(double) const { return 0; }
   void prepare(long, Rng&, Counters&) {}
-  void at_left(long, double& g, double& dg) const { g = dg = 0; }
   void at_right(long, double& g, double& dg) const { g = dg = 0; }
   void at(long, double, Rng&, double& g, double& dg) const { g = dg = 0; }
   double deviation(double) const { return 0; }

@@ -182,7 +182,7 @@ class Session {
         seen = round_number_;
       }
       try {
-        if (!tracer) tracer = std::make_unique<PathTracer>(scene_);
+        if (!tracer) tracer = std::make_unique<PathTracer>(scene_, &cancelled_);
         for (std::int64_t item; !cancelled_ && (item = next_item_++) < items_;)
           if (!render_tile(*tracer, worker, static_cast<int>(item % tiles_),
                            static_cast<int>(item / tiles_)))
@@ -215,6 +215,7 @@ class Session {
           if (cancelled_) return false;
           add_sample(tracer, worker, x, y, options_.first_sample + sample, block);
         }
+        if (cancelled_) return false;  // the last sample may have been cut short
         std::lock_guard tile_lock(tile_locks_[tile]);
         result_.film.add(static_cast<std::size_t>(y) * options_.width + x, block, continues);
         paths_done_ += last - first;

@@ -92,6 +92,10 @@ void Scene::build_objects() {
     const ObjectDescription& o = d.objects[i];
     if (o.type == ObjectDescription::Type::gpis) {
       try {
+        if (!o.process->kernel->differentiable())
+          throw std::invalid_argument("The kernel " + o.process->kernel->describe() +
+                                      " has no gradient, so no normals and no light: take Matern "
+                                      "3/2 for a rough surface.");
         impl_->stochastic.push_back(
             {static_cast<int>(i),
              ProcessSurface(o.process, o.matrix, o.memory, o.sampler, d.settings.missed_root),

@@ -97,7 +97,7 @@ inline std::shared_ptr<GaussianProcess> sphere_process(double length_scale, doub
   const Vec3 r{reach, reach, reach};
   return std::make_shared<GaussianProcess>(GaussianProcess{
       std::make_shared<SphereField>(center, 1), std::make_shared<ConstantField>(sigma),
-      std::make_shared<SquaredExponential>(length_scale), Box3{center - r, center + r}});
+      std::make_shared<SquaredExponential>(length_scale), nullptr, Box3{center - r, center + r}});
 }
 
 inline void add_process(SceneDescription& scene, std::shared_ptr<const GaussianProcess> process,

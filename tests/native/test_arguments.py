@@ -92,6 +92,8 @@ def values(tmp_path_factory):
         "Scene": scene,
         "TensorField": gn.TensorGridField(tensors, 0.5),
         "a": 0.1,
+        "GaussianProcess.anisotropy": None,
+        "inside": None,
         "alpha": 2.0,
         "axis": (0, 0, 1),
         "b": 0.2,

@@ -307,7 +307,7 @@ def test_wrong_arguments(call, message):
         call()
 
 
-@pytest.mark.parametrize("call", [lambda: SE + 1, lambda: SE * "x", lambda: SE(1), lambda: gn.Matern(1.5, 1, nu=1)])
-def test_wrong_types(call):
+@pytest.mark.parametrize("call", [lambda: SE + 1, lambda: SE * "x"])
+def test_operands_that_are_no_kernels(call):
     with pytest.raises(TypeError):
         call()

@@ -79,13 +79,13 @@ def test_implied_correlation(sampler, start, n, seed):
 
 
 def test_conditioned_start_at_tiny_distances(seed):
-    """Oracle 8: Var f = q⁴/2 close to a start with known value and slope, down to q = 1e-4."""
+    """Oracle 8: Var f = q⁴/2 close to a start with known value and slope, down to q = 1e-8."""
     n = 20_000
     origins, directions = along_x(n)
-    state = {"value": np.full(n, 5.0), "gradient": np.zeros((n, 3))}
-    t = np.array([1e-4, 1e-3, 1e-2])
-    v = gn.line_values(standard(5.0), origins, directions, t, start=state, tolerance=1e-6, seed=seed) - 5
-    check_z(np.mean(v**2, axis=0) / (t**4 / 2), 1.0, np.sqrt(2 / n))
+    state = {"value": np.zeros(n), "gradient": np.tile([1.0, 0, 0], (n, 1))}
+    t = np.array([1e-8, 1e-6, 1e-4, 1e-3, 1e-2])
+    v = gn.line_values(standard(), origins, directions, t, start=state, seed=seed)
+    check_z(np.mean((v - t * np.exp(-(t**2) / 2)) ** 2, axis=0) / (t**4 / 2), 1.0, np.sqrt(2 / n))
 
 
 @pytest.mark.parametrize("sampler", SAMPLERS)

@@ -174,7 +174,7 @@ TEST(memory_of_an_overlapped_process_is_kept) {
   add_mesh_object(s, 0, 0);
   const auto process = std::make_shared<GaussianProcess>(GaussianProcess{
       std::make_shared<ConstantField>(0), std::make_shared<ConstantField>(1),
-      std::make_shared<SquaredExponential>(2), Box3{{-0.5, -0.5, -0.5}, {0.5, 0.5, 0.4}}});
+      std::make_shared<SquaredExponential>(2), nullptr, Box3{{-0.5, -0.5, -0.5}, {0.5, 0.5, 0.4}}});
   const auto ray = [](Rng&) { return Ray{{0, 0, 1}, {0, 0, -1}}; };
   const auto arriving = [&](Memory memory) {
     s.objects.resize(1);

@@ -3,45 +3,9 @@
 import gpis_native as gn
 import numpy as np
 import pytest
+from tensor_grids import GRID, ORIGIN, VALUES, VOXEL, entries, matrices, points, random_tensors, trilinear
 
-VOXEL, ORIGIN = np.array([0.4, 0.2, 0.3]), np.array([-1.2, -1.1, -0.9])
 SHEAR = np.array([[0.9, 0.4, 0, 0.3], [-0.3, 1.2, 0.2, 0], [0, 0.1, -0.7, 0.1], [0, 0, 0, 1.0]])
-
-
-def matrices(entries):
-    xx, yy, zz, xy, xz, yz = np.moveaxis(entries, -1, 0)
-    return np.stack([np.stack([xx, xy, xz], -1), np.stack([xy, yy, yz], -1), np.stack([xz, yz, zz], -1)], -2)
-
-
-def entries(m):
-    return np.stack([m[..., 0, 0], m[..., 1, 1], m[..., 2, 2], m[..., 0, 1], m[..., 0, 2], m[..., 1, 2]], -1)
-
-
-def random_tensors(shape, seed=3, ratio=8.0):
-    """Symmetric positive definite, with eigenvalues over a range of ratio², in single precision as a grid keeps them."""
-    rng = np.random.default_rng(seed)
-    q, _ = np.linalg.qr(rng.normal(size=(*shape, 3, 3)))
-    scale = ratio ** rng.uniform(-1, 1, (*shape, 3))
-    return entries(q * scale[..., None, :] @ np.swapaxes(q, -1, -2)).astype(np.float32).astype(float)
-
-
-VALUES = random_tensors((6, 11, 12))
-VALUES[:, :, 9:] = [2, 1, 0.5, 0.25, 0, -0.125]
-
-
-def trilinear(x, values=VALUES):
-    shape = np.array(values.shape[:3])
-    u = np.clip((x - ORIGIN) / VOXEL, 0, shape - 1)
-    cell = np.minimum(u.astype(int), shape - 2)
-    w = u - cell
-    total = np.zeros((len(x), 6))
-    for corner in np.ndindex(2, 2, 2):
-        total += np.prod(np.where(corner, w, 1 - w), axis=1)[:, None] * values[tuple((cell + corner).T)]
-    return total
-
-
-def points(n=2000, seed=1):
-    return np.random.default_rng(seed).uniform(-1.6, 2.6, (n, 3))
 
 
 def moved(x):
@@ -49,7 +13,6 @@ def moved(x):
     return entries(SHEAR[:3, :3] @ matrices(trilinear(x @ back[:3, :3].T + back[:3, 3])) @ SHEAR[:3, :3].T)
 
 
-GRID = gn.TensorGridField(VALUES, VOXEL, ORIGIN)
 FIELDS = {"grid": (GRID, trilinear), "moved grid": (GRID.transformed(SHEAR), moved)}
 
 

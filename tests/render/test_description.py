@@ -163,7 +163,7 @@ WRONG = [
     ("objects.1.matrix", np.diag([1, 1, 0, 1.0]), "objects[1].matrix"),
     ("objects.3.materials", ["wood", "gold"], "objects[3].materials"),
     ("objects.3.memory", "eternal", "objects[3].memory"),
-    ("objects.3.sampler", "magic", "objects[3].sampler: takes auto, convolution, dense, realisation, got 'magic'"),
+    ("objects.3.sampler", "magic", "objects[3].sampler: takes auto, convolution, markov, spectral, nystrom, dense"),
     ("objects.3.process", {"mean": 1}, "objects[3].process: takes a GaussianProcess, got a value of type dict"),
     # What the format has and this version does not
     ("camera.lens", {"radius": 0.1}, "camera.lens: depth of field is not supported"),

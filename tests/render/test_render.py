@@ -329,7 +329,7 @@ def test_samples_that_are_not_finite_are_told(noisy_scene, caplog):
         (dict(first_sample=-16), "first_sample"),
         (dict(seed=-1), "seed"),
         (dict(threads=-1), "threads"),
-        (dict(memory="global"), "memory"),
+        (dict(memory="everything"), "memory"),
         (dict(memory=3), "memory"),
         (dict(progress=3), "progress: takes a function"),
     ],
@@ -342,9 +342,9 @@ def test_wrong_arguments_are_refused(noisy, wrong, words):
 
 
 def test_unknown_keywords_are_refused(noisy):
-    with pytest.raises(TypeError):
+    with pytest.raises(ValueError, match="sample"):
         gn.render(noisy, 8, 8, samples=16, sample=3)
-    with pytest.raises(TypeError):
+    with pytest.raises(ValueError):
         gn.render(noisy, 8, 8, 16)
 
 

@@ -1,0 +1,123 @@
+#include "process/joint_dense_path.h"
+
+#include "process/march_sampler.h"
+#include "process/survey.h"
+
+namespace gpis {
+namespace {
+
+// |implied - exact correlation| of the cubics through values and slopes at points h apart from the
+// middle of one cell to that of another and to the points, at most.
+double error_of_cubics(const Covariance& covariance, const LineGeometry& line, double t, double h) {
+  struct Part {
+    LocalPoint at;
+    Functional what;
+  };
+  const Vec3 d = line.direction;
+  const auto at = [&](double s) { return covariance.at(line.origin + d * s); };
+  // The error in the middle of a cell: what the cubic has there, less g.
+  const auto error = [&](double a) {
+    return std::array<Part, 3>{Part{at(a), {0.5, d * (h / 8)}}, Part{at(a + 0.5 * h), {-1, {}}},
+                               Part{at(a + h), {0.5, d * (-h / 8)}}};
+  };
+  const auto value = [&](double s) { return std::array<Part, 1>{Part{at(s), {}}}; };
+  const auto shared = [&](const auto& a, const auto& b) {
+    double sum = 0;
+    for (const Part& p : a)
+      for (const Part& q : b) sum += covariance.between(p.at, p.what, q.at, q.what);
+    return sum;
+  };
+  const auto here = error(t);
+  double largest = 0;
+  for (int k = 0; k < 4; ++k) {
+    const double a = t + k * h;
+    const auto there = error(a);
+    const double at_middles =
+        shared(here, value(a + 0.5 * h)) + shared(value(t + 0.5 * h), there) + shared(here, there);
+    largest = std::max({largest, std::abs(at_middles), std::abs(shared(here, value(a)))});
+  }
+  return largest / covariance.variance();
+}
+
+}  // namespace
+
+JointDensePath::Plan::Plan(const GaussianProcess& process, const Box3& bounds)
+    : JointLine::Plan(process), spacing(covariance.smooth() ? 0.25 : 0.15) {
+  // Closer points until the cubics are good enough for lengths that vary.
+  for (;; spacing *= 0.7) {
+    correlation_error = 0;
+    for (const SurveyLine& line : survey_lines(covariance, bounds)) {
+      const double h = 2 * spacing * survey_step(covariance, line.geometry, 0, line.end);
+      if (!std::isfinite(h)) continue;
+      const int cells = static_cast<int>(std::min(line.end / h, 200.0));
+      for (int i = 0; i < cells; ++i)
+        correlation_error =
+            std::max(correlation_error, error_of_cubics(covariance, line.geometry, i * h, h));
+    }
+    if (correlation_error < 5e-4 || spacing < 0.05) break;
+  }
+}
+
+void JointDensePath::reset(const Plan& plan, const LineGeometry& line, double anchor, double t_end,
+                           Counters& counters) {
+  begin(plan, line, anchor, counters);
+  step_ = 2 * plan.spacing * survey_step(*covariance_, line, anchor, t_end);
+}
+
+void JointDensePath::start_free(Rng& rng, Counters& counters, double& g, double& dg) {
+  JointLine::start_free(rng, counters, g, dg);
+  points_.assign(1, {0, g, dg});
+}
+
+double JointDensePath::start(const PathStart& known, Rng& rng, Counters& counters) {
+  const double slope = JointLine::start(known, rng, counters);
+  points_.assign(1, {0, known.value, slope});
+  return slope;
+}
+
+void JointDensePath::draw(long index, Rng& rng, Counters& counters) {
+  if (points_.back().index >= index) return;
+  if (std::isinf(step_)) {  // constant along the line
+    points_.push_back({index, points_.back().g, points_.back().dg});
+    return;
+  }
+  if (rows_.active() > kMostRows) rows_.forget(lasting_rows_, kKept);
+  const LocalPoint p = point(anchor_ + index * step_);
+  const double g = rows_.add_free(p, value_row(), rng, counters);
+  points_.push_back({index, g, rows_.add_free(p, slope_row(), rng, counters)});
+}
+
+void JointDensePath::prepare(long cell, Rng& rng, Counters& counters) {
+  draw(cell, rng, counters);
+  draw(cell + 1, rng, counters);
+}
+
+void JointDensePath::at_left(long cell, double& g, double& dg) const {
+  std::size_t i = points_.size() - 1;
+  while (points_[i].index > cell) --i;
+  g = points_[i].g;
+  dg = points_[i].dg;
+}
+
+void JointDensePath::at(long cell, double t, Rng&, double& g, double& dg) const {
+  double a, da, b, db;
+  at_left(cell, a, da);
+  if (std::isinf(step_)) {
+    g = a;
+    dg = da;
+    return;
+  }
+  at_right(cell, b, db);
+  // Bernstein form of the cubic through both ends.
+  const double s = (t - anchor_) / step_ - cell, r = 1 - s;
+  const double c1 = a + da * step_ / 3, c2 = b - db * step_ / 3;
+  g = r * r * r * a + 3 * r * r * s * c1 + 3 * r * s * s * c2 + s * s * s * b;
+  dg = 3 * (r * r * (c1 - a) + 2 * r * s * (c2 - c1) + s * s * (b - c2)) / step_;
+}
+
+std::unique_ptr<LineSampler> make_joint_dense(const GaussianProcess& process, const Box3& bounds) {
+  return std::make_unique<MarchSampler<AnyLine, AnyLine, JointDensePath>>(
+      JointDensePath::Plan(process, bounds));  // covariances cost more than virtual fields
+}
+
+}  // namespace gpis

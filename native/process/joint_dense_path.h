@@ -1,0 +1,42 @@
+// Sampler 5, dense, where covariances differ from line to line (tensor fields, kernels without
+// normal form, off-line conditions): values and slopes of g drawn jointly at points of a fixed
+// spacing, all given all before; in between the cubic through both. The last resort.
+#pragma once
+
+#include "process/joint_line.h"
+
+namespace gpis {
+
+class JointDensePath : public JointLine {
+ public:
+  static constexpr int kStride = 1;
+  static constexpr double kLastStep = 1e-5;
+  struct Plan : JointLine::Plan {
+    Plan(const GaussianProcess& process, const Box3& bounds);
+    double spacing;  // of points, in the shortest length scale of the line
+  };
+
+  void reset(const Plan& plan, const LineGeometry& line, double anchor, double t_end,
+             Counters& counters);
+  double step() const { return step_; }
+  void start_free(Rng& rng, Counters& counters, double& g, double& dg);
+  double start(const PathStart& known, Rng& rng, Counters& counters);
+  void prepare(long cell, Rng& rng, Counters& counters);
+  void at_left(long cell, double& g, double& dg) const;
+  void at_right(long cell, double& g, double& dg) const { at_left(cell + 1, g, dg); }
+  void at(long cell, double t, Rng&, double& g, double& dg) const;
+  double deviation(double) const { return 0; }
+
+ private:
+  struct Point {
+    long index;  // anchor + index · step
+    double g, dg;
+  };
+  void draw(long index, Rng& rng, Counters& counters);
+
+  double step_ = 1;
+  std::vector<Point> points_;  // in increasing order
+};
+static_assert(LinePath<JointDensePath>);
+
+}  // namespace gpis

@@ -1,0 +1,109 @@
+#include "process/joint_line.h"
+
+#include "field/check.h"
+
+namespace gpis {
+namespace {
+
+Eigen::Vector4d of(const Functional& f) {
+  return {f.value, f.slope.x, f.slope.y, f.slope.z};
+}
+
+}  // namespace
+
+JointLine::Plan::Plan(const GaussianProcess& process) : covariance(process) {
+  if (!covariance.differentiable())
+    refuse("The kernel ", process.kernel->describe(),
+           " has no gradient: the joint samplers take differentiable kernels.");
+}
+
+void JointLine::begin(const Plan& plan, const LineGeometry& line, double anchor,
+                      Counters& counters) {
+  covariance_ = &plan.covariance;
+  line_ = line;
+  anchor_ = anchor;
+  rows_.reset(plan.covariance);
+  ++counters.factorisations;
+  lasting_rows_ = rows_.count();
+  at_anchor_ = point(anchor);
+  rows_.law(at_anchor_, anchor_mean_, anchor_law_);
+  pull_end_ = anchor;
+}
+
+void JointLine::slope_law(double g0, double& mean, double& deviation) const {
+  const Eigen::Vector4d d = of(slope_row());
+  const double variance = anchor_law_(0, 0), shared = anchor_law_.row(0).dot(d);
+  const double gain = variance > JointRows::kPivot ? shared / variance : 0;
+  mean = anchor_mean_.dot(d) + gain * (g0 - anchor_mean_[0]);
+  deviation = std::sqrt(std::max(0.0, d.dot(anchor_law_ * d) - gain * shared));
+}
+
+void JointLine::start_free(Rng& rng, Counters& counters, double& g, double& dg) {
+  rows_.truncate(lasting_rows_);
+  g = rows_.add_free(at_anchor_, value_row(), rng, counters);
+  dg = rows_.add_free(at_anchor_, slope_row(), rng, counters);
+}
+
+double JointLine::start(const PathStart& known, Rng& rng, Counters& counters) {
+  rows_.truncate(lasting_rows_);
+  rows_.add_known(at_anchor_, value_row(), known.value, 0, counters);
+  double slope = known.slope;
+  if (known.slope_known)
+    rows_.add_known(at_anchor_, slope_row(), slope, 0, counters);
+  else
+    slope = rows_.add_free(at_anchor_, slope_row(), rng, counters);
+  if (known.gradient_known) {
+    const Frame across(normalize(line_.direction));
+    for (const Vec3& w : {across.s, across.t})
+      rows_.add_known(at_anchor_, {0, w}, dot(w, known.gradient), 0, counters);
+  }
+  // A correlation of 1e-6 of what is known no longer matters; lengths at most the longest.
+  const double reach = std::min(covariance_->reach(1e-6), 60.0) * covariance_->longest_length();
+  pull_end_ = std::max(pull_end_, anchor_ + reach / length(line_.direction));
+  return slope;
+}
+
+double JointLine::deviation_from_cubic(double a, double h) const {
+  const LocalPoint p[3] = {point(a), point(a + 0.5 * h), point(a + h)};
+  const Vec3 d = line_.direction;
+  const Functional f[3] = {{-0.5, d * (-h / 8)}, {1, {}}, {-0.5, d * (h / 8)}};
+  double variance = 0;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j <= i; ++j)
+      variance += (i == j ? 1 : 2) * covariance_->between(p[i], f[i], p[j], f[j]);
+  return std::sqrt(std::max(0.0, variance));
+}
+
+// The law of ∇g given all rows. The little variance that they leave to the slope along the line is
+// the path's error; the path's slope stands.
+PathGradient JointLine::gradient(double t, double, double dg, Rng&) const {
+  const LocalPoint at = point(t);
+  Eigen::Vector4d mean;
+  Eigen::Matrix4d law;
+  rows_.law(at, mean, law);
+  const Eigen::Matrix4d prior = covariance_->block(at, at);
+  const Vec3& direction = line_.direction;
+  const Frame frame(normalize(direction));
+  PathGradient out;
+  out.mean = {mean[1], mean[2], mean[3]};
+  out.mean += direction * ((dg - dot(direction, out.mean)) / dot(direction, direction));
+  const Eigen::Vector4d s = of({0, frame.s}), u = of({0, frame.t});
+  const auto across = [&](const Eigen::Matrix4d& m) {
+    Eigen::Matrix2d c;
+    c << s.dot(m * s), s.dot(m * u), u.dot(m * s), u.dot(m * u);
+    return c;
+  };
+  const Eigen::Matrix2d spread = across(law), whole = across(prior);
+  const double first = std::sqrt(std::max(0.0, spread(0, 0)));
+  const double both = first > 0 ? spread(0, 1) / first : 0;
+  const double second = std::sqrt(std::max(0.0, spread(1, 1) - both * both));
+  out.b1 = frame.s * first + frame.t * both;
+  out.b2 = frame.t * second;
+  const auto area2 = [](const Eigen::Matrix2d& c) {
+    return std::max(0.0, c(0, 0) * c(1, 1) - c(0, 1) * c(1, 0));
+  };
+  out.free_variance = std::sqrt(area2(spread) / std::max(area2(whole), 1e-300));
+  return out;
+}
+
+}  // namespace gpis

@@ -1,0 +1,86 @@
+// Linear functionals of g, drawn or known jointly: one row of a Cholesky factor each, added one
+// after the other (math.md §3, §5.4). A row that the ones before it determine is left out.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "core/counters.h"
+#include "core/rng.h"
+#include "process/covariance.h"
+
+namespace gpis {
+
+class JointRows {
+ public:
+  // A row is left out where the rows before leave it less variance than this, relative to its own:
+  // known ones (definitions B11), and drawn ones. Rounding reaches the variance left to later rows
+  // multiplied by the square of weights that grow as 1/√pivot: rows come in the order of the line
+  // and not of their pivots, so drawn ones, which nobody misses, are left out earlier.
+  static constexpr double kPivot = 1e-10, kDrawnPivot = 1e-7;
+
+  void reset(const Covariance& covariance);
+  // Forgets all rows but the first `count`.
+  void truncate(int count);
+  int count() const { return static_cast<int>(rows_.size()); }
+  // Rows that new ones are drawn given: all, or those since `forget`.
+  int active() const { return count() - base_; }
+
+  // A functional with a known value (known but for noise of this variance). The return: how many
+  // standard deviations the value lies from what the rows before it say; 0 where it is left out.
+  double add_known(const LocalPoint& at, const Functional& what, double value, double noise,
+                   Counters& counters);
+  // A functional drawn given the rows before it; its value.
+  double add_free(const LocalPoint& at, const Functional& what, Rng& rng, Counters& counters);
+  // From now on rows are drawn given the first `first` and the `last` rows alone.
+  void forget(int first, int last);
+
+  // Law of (g, ∇g) at a point, given the active rows.
+  void law(const LocalPoint& at, Eigen::Vector4d& mean, Eigen::Matrix4d& covariance) const;
+
+  // The mean of g given the active rows is Σ weight · cov(g, row). Later rows leave it as it is.
+  struct Mean {
+    int first_row = 0;
+    std::vector<double> weights;
+  };
+  Mean mean() const;
+  // That mean and its slope along d; `da` is ∂_d A.
+  void evaluate(const Mean& mean, const LocalPoint& at, const Vec3& d, const SymMat3& da, double& g,
+                double& dg) const;
+
+  // Norm, in the space of the kernel, of the mean that the known rows make: it exceeds the mean
+  // anywhere, in units of the deviation of g.
+  double known_norm() const { return std::sqrt(known_norm2_); }
+
+ private:
+  struct Row {
+    LocalPoint at;
+    Functional what;
+    double value, noise;
+    bool known;
+  };
+  using FactorRow = Eigen::Map<const Eigen::VectorXd>;
+
+  // Row i of the factor, of the active rows: i entries and its diagonal.
+  FactorRow factor_row(int i) const {
+    return {factor_.data() + static_cast<std::size_t>(i) * (i + 1) / 2, i};
+  }
+  double diagonal(int i) const {
+    return factor_[static_cast<std::size_t>(i) * (i + 1) / 2 + static_cast<std::size_t>(i)];
+  }
+  const Row& row(int i) const { return rows_[static_cast<std::size_t>(base_ + i)]; }
+  // Fills next_ with the row's entries of the factor: the mean that the rows before it leave to it,
+  // and the variance.
+  double border(const LocalPoint& at, const Functional& what, double own, double& mean);
+  void append(const Row& row, double pivot, double xi);
+
+  const Covariance* covariance_ = nullptr;
+  std::vector<Row> rows_;
+  int base_ = 0;
+  std::vector<double> factor_;  // packed lower triangle, row by row
+  std::vector<double> xi_;      // whitened values
+  Eigen::VectorXd next_;
+  double known_norm2_ = 0;
+};
+
+}  // namespace gpis

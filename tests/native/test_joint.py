@@ -1,0 +1,213 @@
+"""The joint samplers: lines of processes whose length scales vary, and of kernels that no other sampler serves."""
+
+import gpis_native as gn
+import numpy as np
+import pytest
+from statistics_checks import check_same_distribution, check_z
+from tensor_grids import along_x, isotropic, rotating
+
+pytestmark = pytest.mark.stats
+
+
+def smooth_step(x):
+    x = np.clip(x, 0, 1)
+    return x * x * (3 - 2 * x)
+
+
+# Issue "the process, exact", must show 6.
+FIELDS = {
+    "length e^{x/4}": along_x(lambda x: isotropic(np.exp(0.25 * x)), 8),
+    "length times 4 within one": along_x(lambda x: isotropic(4 ** smooth_step(x - 2)), 8, 641),
+    "rotating 3:1": along_x(rotating, 8),
+}
+KERNELS = {"se": gn.SquaredExponential(1), "rq": gn.RationalQuadratic(1, 1), "matern 3/2": gn.Matern(1.5, 1)}
+BOUNDS = ((-2, -2, -2), (8, 2, 2))
+
+
+def process(field, kernel="se", mean=0.0, sigma=1.0):
+    return gn.GaussianProcess(mean, sigma, KERNELS[kernel], anisotropy=FIELDS[field], bounds=BOUNDS)
+
+
+def along(n, direction=(1.0, 0, 0), origin=(0.0, 0, 0)):
+    return np.tile(origin, (n, 1)), np.tile(direction, (n, 1))
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+@pytest.mark.parametrize("field", FIELDS)
+def test_representation_error(field, kernel):
+    """What the sampler that `auto` picks states, from the covariances of its own rows: no randomness in it."""
+    plan = process(field, kernel).plan()
+    assert plan["sampler"].startswith("dense" if kernel.startswith("matern") else "nystrom")
+    assert 0 < float(plan["correlation_error"]) < 1e-3
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+@pytest.mark.parametrize("field", FIELDS)
+def test_implied_correlation(field, kernel, full_size, seed):
+    """Values that a render's own line takes, against the covariance of Paciorek and Schervish (test_covariance.py)."""
+    n = (40_000 if full_size else 4_000) // (1 if kernel == "se" else 4)
+    direction = np.array([0.96, 0.28, 0])
+    t = np.array([0.05, 0.4, 1.0, 1.7, 2.3, 2.6, 3.1, 4.5])
+    g = gn.line_values(process(field, kernel, 5.0), *along(n, direction), t, tolerance=1e-6, seed=seed) - 5
+    g = g[np.isfinite(g).all(axis=1)]
+    assert len(g) > 0.99 * n
+    k = process(field, kernel).covariance(t[:, None] * direction, t[:, None] * direction)
+    error = np.sqrt((np.outer(np.diag(k), np.diag(k)) + k**2) / len(g))
+    check_z(np.maximum(np.abs(g.T @ g / len(g) - k) - 1e-3, 0), 0, error, "covariance")
+    check_z(g.mean(axis=0), 0, 1 / np.sqrt(len(g)), "mean")
+
+
+def test_implied_correlation_given_value_and_slope(full_size, seed):
+    """A start with known value and gradient: the conditional law of the design (math.md §3), by numpy."""
+    n, t = 20_000 if full_size else 4_000, np.array([0.02, 0.3, 0.9, 2.0])
+    direction = np.array([0.6, 0.8, 0])
+    gradient = np.array([0.4, -0.5, 0.3])
+    start = {"value": np.full(n, 5.5), "gradient": np.tile(gradient, (n, 1))}
+    gp = process("rotating 3:1", mean=5.0)
+    g = gn.line_values(gp, *along(n, direction), t, start=start, tolerance=1e-6, seed=seed) - 5
+    g = g[np.isfinite(g).all(axis=1)]
+    x, zero = t[:, None] * direction, np.zeros((1, 3))
+    data = gp.joint_covariance(zero, zero)[0, 0]
+    cross = gp.joint_covariance(x, zero)[:, 0, 0]
+    weights = np.linalg.solve(data, cross.T).T
+    mean = weights @ [0.5, *gradient]
+    k = gp.covariance(x, x) - weights @ cross.T
+    sd = np.sqrt(np.diag(k))
+    check_z(g.mean(axis=0), mean, sd / np.sqrt(len(g)), "mean")
+    c = g - mean
+    check_z(c.T @ c / len(g) / np.outer(sd, sd), k / np.outer(sd, sd), np.sqrt(2 / len(g)), "covariance")
+
+
+def hits_twice(gp, n, sampler, seed, memory="renewal+"):
+    """First hits from above and, reflected, the second ones."""
+    rng = np.random.default_rng(seed)
+    origins = np.column_stack([rng.uniform(0, 5, n), rng.uniform(-1, 1, n), np.full(n, 1.9)])
+    directions = np.array([0.3, 0.1, -1.0]) + rng.normal(0, 0.1, (n, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    first = gn.first_hits(gp, origins, directions, 10, sampler=sampler, seed=seed)
+    hit = np.isfinite(first["t"])
+    d, g = directions[hit], first["gradient"][hit]
+    assert np.all(np.sum(d * g, axis=1) <= 0)
+    normal = g / np.linalg.norm(g, axis=1, keepdims=True)
+    out = d - 2 * np.sum(d * normal, axis=1, keepdims=True) * normal
+    state = {"value": first["state"]["value"][hit], "gradient": first["state"]["gradient"][hit]}
+    at = first["position"][hit]
+    second = gn.first_hits(gp, at, out, 10, memory=memory, start=state, sampler=sampler, seed=seed + 5)
+    found = np.isfinite(second["t"])
+    assert np.all(np.sum(out[found] * second["gradient"][found], axis=1) <= 0)
+    assert first["counters"]["line_slope_floor"] == second["counters"]["line_slope_floor"] == 0
+    return first, second
+
+
+def check_same_hits(a, b):
+    for which, x, y in zip(["first", "second"], a, b, strict=True):
+        check_same_distribution(x["t"], y["t"], f"{which} t")
+        for axis in range(3):
+            pair = [h["gradient"][np.isfinite(h["t"]), axis] for h in (x, y)]
+            check_same_distribution(*pair, f"{which} gradient {axis}")
+
+
+@pytest.mark.parametrize("memory", ["renewal+", "renewal"])
+@pytest.mark.parametrize("sampler", ["nystrom", "dense"])
+def test_agrees_with_the_convolution_sampler(sampler, memory, full_size, seed):
+    """A stationary process: by itself, and as a constant tensor field."""
+    n = 20_000 if full_size else 3_000
+    mean = gn.PlaneField([0, 0, 0], [0.1, 0, 1], 1)
+    alone = gn.GaussianProcess(mean, 0.3, gn.SquaredExponential([0.8, 0.5, 0.5]), bounds=BOUNDS)
+    field = along_x(lambda x: np.array([0.64, 0.25, 0.25, 0, 0, 0]), 8, 3)
+    as_field = gn.GaussianProcess(mean, 0.3, KERNELS["se"], anisotropy=field, bounds=BOUNDS)
+    check_same_hits(
+        hits_twice(alone, n, "convolution", seed, memory), hits_twice(as_field, n, sampler, seed + 100, memory)
+    )
+
+
+@pytest.mark.parametrize("field", ["length e^{x/4}", "rotating 3:1"])
+def test_two_samplers_agree_where_lengths_vary(field, full_size, seed):
+    n = 10_000 if full_size else 2_000
+    gp = process(field, mean=gn.PlaneField([0, 0, 0], [0.1, 0, 1], 1), sigma=0.4)
+    check_same_hits(hits_twice(gp, n, "nystrom", seed), hits_twice(gp, n, "dense", seed + 100))
+
+
+@pytest.mark.parametrize("field", FIELDS)
+def test_first_hit_of_explicit_realisations(field, full_size, seed):
+    """Jointly drawn at 300 points of the line, changes of sign found between them."""
+    n, direction = 20_000 if full_size else 3_000, np.array([0.8, 0.6, 0])
+    gp = process(field, mean=0.3)
+    t = np.linspace(0, 3, 301)
+    f = gp.sample(t[:, None] * direction, 2 * n, seed)
+    f = f[f[:, 0] > 0][:n]
+    below = f < 0
+    first, rows = np.argmax(below, axis=1), np.arange(len(f))
+    a, b = f[rows, np.maximum(first - 1, 0)], f[rows, first]
+    expected = np.where(below.any(axis=1), t[first] - 0.01 * b / np.where(a > b, b - a, -1), np.inf)
+    hits = gn.first_hits(gp, *along(len(f), direction), 3, seed=seed)
+    check_same_distribution(hits["t"], expected)
+
+
+def test_gradient_at_a_hit_given_the_start(full_size, seed):
+    """A mean so steep that every path hits at t = 1.3: the law of the whole gradient there given value and gradient at
+    the start, by numpy."""
+    n, direction, steep = 20_000 if full_size else 4_000, np.array([0.6, 0.8, 0]), 1e4
+    gp = process("rotating 3:1", mean=gn.PlaneField(1.3 * direction, direction, -steep))
+    g0 = np.array([0.4, 0.5, -0.9, 0.7])  # of g
+    gradient = g0[1:] - steep * direction
+    start = {"value": np.full(n, 1.3 * steep + g0[0]), "gradient": np.tile(gradient, (n, 1))}
+    hits = gn.first_hits(gp, *along(n, direction), 10, start=start, seed=seed)
+    np.testing.assert_allclose(hits["t"], 1.3, atol=1e-3)
+    g = hits["gradient"] + steep * direction
+    x, zero = 1.3 * direction[None], np.zeros((1, 3))
+    cross, here = gp.joint_covariance(x, zero)[0, 0], gp.joint_covariance(x, x)[0, 0]
+    w = np.linalg.solve(gp.joint_covariance(zero, zero)[0, 0], cross.T).T
+    mean, law = w @ g0, here - w @ cross.T
+    whitened = np.linalg.solve(np.linalg.cholesky(law[1:, 1:]), (g - mean[1:]).T)
+    check_z(whitened.mean(axis=1), 0, 1 / np.sqrt(n), "mean")
+    check_z(whitened @ whitened.T / n, np.eye(3), np.sqrt((1 + np.eye(3)) / n), "covariance")
+
+
+def test_kernels_that_no_other_sampler_serves(full_size, seed):
+    """A product without normal form, on the line against its own covariance."""
+    n, kernel = 4_000 if full_size else 800, gn.Matern(2.5, 1) * gn.SquaredExponential(2)
+    gp = gn.GaussianProcess(5.0, 1, kernel, bounds=BOUNDS)
+    assert gp.plan()["sampler"].startswith("dense")
+    t = np.array([0.1, 0.5, 1.2, 2.5])
+    g = gn.line_values(gp, *along(n), t, tolerance=1e-6, seed=seed) - 5
+    g = g[np.isfinite(g).all(axis=1)]
+    x = t[:, None] * [1.0, 0, 0]
+    k = gp.covariance(x, x)
+    check_z(g.T @ g / len(g), k, np.sqrt((1 + k**2) / len(g)))
+
+
+def test_long_lines_forget_nothing_that_matters(seed):
+    """600 length scales in one line: rows are dropped on the way, and neighbours stay as correlated as they are."""
+    n = 40
+    gp = gn.GaussianProcess(4.5, 1, gn.SquaredExponential(0.02), bounds=((0, -1, -1), (12, 1, 1)))
+    t = np.arange(0.1, 11.9, 0.02)
+    g = gn.line_values(gp, *along(n), t, tolerance=1e-4, sampler="nystrom", seed=seed) - 4.5
+    g = g[np.isfinite(g).all(axis=1)]
+    assert len(g) > n / 2
+    products = np.mean(g[:, 1:] * g[:, :-1], axis=0)  # each lag of one length scale: e^{-1/2}
+    blocks = products[: len(products) // 10 * 10].reshape(-1, 10).mean(axis=1)
+    check_z(blocks.mean(), np.exp(-0.5), blocks.std() / np.sqrt(len(blocks)) * 2)
+
+
+def test_counters(seed):
+    """One factorisation for each line here, and none where the kernel is stationary and served otherwise."""
+    mean = gn.SphereField([2, 0, 0], 1)
+    origins, directions = along(500, (0.0, 0, -1), (2.0, 0.3, 1.9))
+    far = origins + [0, 50, 0]
+    gp = process("rotating 3:1", mean=mean, sigma=0.1)
+    counters = gn.first_hits(gp, origins, directions, 10, seed=seed)["counters"]
+    assert counters["factorisations"] == counters["line_segments"] == 500 and counters["line_normals"] > 500 * 10
+    counters = gn.first_hits(gp, far, directions, 10, seed=seed)["counters"]
+    assert counters["factorisations"] == counters["line_normals"] == 0 and counters["line_skipped"] == 500
+    stationary = gn.GaussianProcess(mean, 0.1, KERNELS["se"], bounds=BOUNDS)
+    assert gn.first_hits(stationary, origins, directions, 10, seed=seed)["counters"]["factorisations"] == 0
+
+
+def test_unsuitable_kernels_get_a_sentence():
+    rough = gn.GaussianProcess(0, 1, gn.Matern(1.5, 1), bounds=BOUNDS)
+    with pytest.raises(ValueError, match="values at half a length scale do not determine it. Take the sampler 'dense'"):
+        gn.first_hits(rough, *along(1), 1, sampler="nystrom")
+    broken = gn.GaussianProcess(0, 1, gn.Matern(0.5, 1), anisotropy=FIELDS["rotating 3:1"], bounds=BOUNDS)
+    with pytest.raises(ValueError, match="has no gradient"):
+        gn.first_hits(broken, *along(1), 1)

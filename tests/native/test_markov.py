@@ -1,0 +1,241 @@
+"""Lines of Matérn and Wong kernels against closed forms (design oracles, numbered as there), and every kernel that two
+samplers serve: one sampler against the other."""
+
+import gpis_native as gn
+import numpy as np
+import pytest
+from statistics_checks import SIGNIFICANCE, check_proportion, check_same_distribution, check_z
+
+pytestmark = pytest.mark.stats
+LINE = ((-1, -1, -1), (12, 1, 1))  # bounds around the x axis, short enough for the dense sampler
+KERNELS = {
+    "squared exponential": gn.SquaredExponential,
+    "matern 3/2": lambda *a, **k: gn.Matern(1.5, *a, **k),
+    "matern 5/2": lambda *a, **k: gn.Matern(2.5, *a, **k),
+    "wong": gn.Wong,
+    "rational quadratic": lambda *a, **k: gn.RationalQuadratic(0.7, *a, **k),
+}
+FAST = {"squared exponential": "convolution", "matern 3/2": "markov", "matern 5/2": "markov", "wong": "markov"}
+PAIRS = [(kernel, sampler) for kernel in KERNELS for sampler in (FAST.get(kernel), "dense") if sampler]
+ROUGH = ["matern 3/2", "matern 5/2", "wong"]
+
+
+@pytest.fixture
+def n(full_size):
+    return 1_000_000 if full_size else 100_000
+
+
+def along_x(n):
+    return np.zeros((n, 3)), np.tile([1.0, 0.0, 0.0], (n, 1))
+
+
+def on_surface(n, gradient=(1.0, 0.3, -0.2)):
+    return {"value": np.zeros(n), "gradient": np.tile(np.asarray(gradient, float), (n, 1))}
+
+
+def process(kernel, mean=0.0, sigma=1.0, bounds=LINE, length_scale=1.0):
+    return gn.GaussianProcess(mean, sigma, KERNELS[kernel](length_scale), bounds=bounds)
+
+
+@pytest.mark.parametrize("sampler", ["markov", "dense"])
+@pytest.mark.parametrize(
+    ("start", "memory", "survival"),
+    [
+        ("slope 1", "renewal+", [0.81637, 0.66014, 0.47057, 0.19405]),
+        ("surface", "renewal", [0.81842, 0.68804, 0.50282, 0.20911]),
+        ("outside", "renewal+", [0.85624, 0.73684, 0.54929, 0.23051]),
+    ],
+)
+def test_survival_of_wong(sampler, start, memory, survival, n, seed):
+    """Oracle 5, closed form (McKean 1963, Wong 1966), exact to its last digit."""
+    origins, directions = along_x(2 * n)
+    state = None if start == "outside" else on_surface(2 * n)
+    hits = gn.first_hits(process("wong"), origins, directions, 6, memory=memory, start=state, sampler=sampler, seed=seed)
+    times = [0.5, 1, 2, 5]
+    check_proportion([np.sum(hits["t"] > t) for t in times], 2 * n, survival, 5e-6, f"{sampler}, {start}")
+
+
+@pytest.mark.parametrize("sampler", ["markov", "dense"])
+def test_slope_of_wong_at_its_first_return(sampler, n, seed):
+    """Oracle 5: joint density of u = e^{2t/√3} - 1 and h, slope at the hit 2h/√(1+u), from slope v = 2b = 1."""
+    from math import erf
+
+    b, t_max = 0.5, 8.0
+    hits = gn.first_hits(process("wong"), *along_x(n), t_max, start=on_surface(n), sampler=sampler, seed=seed)
+    hit = np.isfinite(hits["t"])
+    u_edges = np.geomspace(1e-7, np.expm1(2 * t_max / np.sqrt(3)), 2401)
+    u = np.sqrt(u_edges[1:] * u_edges[:-1])[:, None]
+    h = (np.arange(1500) + 0.5) / 1500 * 12 * (np.sqrt(u) + b)
+    weight = (
+        np.sqrt(3) * h / (np.pi * u**2) * np.exp(-2 * (b * b - b * h + h * h) / u) * np.vectorize(erf)(np.sqrt(6 * b * h / u))
+    )
+    weight *= np.diff(u_edges)[:, None] * (h[:, 1] - h[:, 0])[:, None]
+    assert abs(weight.sum() - hit.mean()) < 5.33 * 0.5 / np.sqrt(n) + 1e-4
+    slope = (2 * h / np.sqrt(1 + u)).ravel()
+    order = np.argsort(slope)
+    expected = np.cumsum(weight.ravel()[order]) / weight.sum()
+    got = np.sort(-hits["gradient"][hit, 0])
+    cdf = np.interp(got, slope[order], expected)
+    steps = np.arange(len(got) + 1) / len(got)
+    distance = max(np.max(steps[1:] - cdf), np.max(cdf - steps[:-1]))
+    assert 2 * np.exp(-2 * len(got) * max(distance - 5e-4, 0) ** 2) > SIGNIFICANCE, distance
+
+
+@pytest.mark.parametrize(("kernel", "sampler"), PAIRS)
+@pytest.mark.parametrize("start", ["outside", "value and slope"])
+def test_implied_correlation(kernel, sampler, start, n, seed):
+    """Correlation of the values that a render's own line takes; a mean of 5 deviations keeps every path outside."""
+    gp, (origins, directions) = process(kernel, 5.0), along_x(n)
+    t = np.array([0.01, 0.05, 0.3, 0.5, 0.77, 1.0, 1.9, 2.6, 4.0])
+    points, k = t[:, None] * [1.0, 0, 0], KERNELS[kernel](1.0)
+    covariance, mean, state = k(points, points), np.zeros(len(t)), None
+    if start != "outside":  # value .5 and slope -.4 at 0: they are independent there
+        state = {"value": np.full(n, 5.5), "gradient": np.tile([-0.4, 0.1, 0.2], (n, 1))}
+        value, slope = k(points, np.zeros((1, 3)))[:, 0], -k.gradient(points, np.zeros((1, 3)))[:, 0, 0]
+        lambda2 = k.derivative_variance([1, 0, 0])
+        mean = 0.5 * value - 0.4 * slope / lambda2
+        covariance = covariance - np.outer(value, value) - np.outer(slope, slope) / lambda2
+    g = gn.line_values(gp, origins, directions, t, start=state, sampler=sampler, tolerance=1e-6, seed=seed) - 5
+    g = g[np.isfinite(g).all(axis=1)]
+    assert len(g) > 0.999 * n
+    m, deviation = len(g), np.sqrt(np.diag(covariance))
+    check_z(g.mean(axis=0), mean, deviation / np.sqrt(m) + 1e-6, "mean")
+    # What the plans state; relative for the exact ones, since close to a known start everything is small.
+    stated = 2.1e-4 if sampler == "dense" else 1e-7 * np.add.outer(deviation, deviation)
+    error = np.sqrt((np.outer(deviation, deviation) ** 2 + covariance**2) / m)
+    difference = np.abs((g - mean).T @ (g - mean) / m - covariance) - stated
+    check_z(np.maximum(difference, 0), 0, error, "covariance")
+
+
+@pytest.mark.parametrize("kernel", ROUGH)
+def test_conditioned_start_at_tiny_distances(kernel, seed):
+    """Oracle 8 for Markov lines: Var f = c t³ or c t⁵ next to a known value and slope, down to 1e-8 of a length scale."""
+    n = 20_000
+    t = np.array([1e-8, 1e-6, 1e-4, 1e-2])
+    v = gn.line_values(process(kernel), *along_x(n), t, start=on_surface(n), seed=seed)
+    # Integrated Brownian motion (formulas C2, C4), and with the second derivative free for Matérn 5/2 (C3): 1 - 1/9.
+    variance = {
+        "matern 3/2": 4 / 3 * (np.sqrt(3) * t) ** 3,
+        "matern 5/2": 8 / 9 * (np.sqrt(5) * t) ** 4 / 4,
+        "wong": 8 / np.sqrt(3) / 3 * t**3,
+    }[kernel]
+    # A slope of 1 falls by at most 2t per length scale, relative to the standard deviation that is t^½ or less.
+    check_z(np.nanmean((v[:, :3] - t[:3]) ** 2, axis=0) / variance[:3], 1.0, np.sqrt(2 / n) + 2e-3)
+
+
+@pytest.mark.parametrize(("kernel", "sampler"), PAIRS)
+def test_few_roots_are_missed(kernel, sampler, full_size, seed):
+    """Rays said to have no hit, looked at 400 times: fewer than 1e-3 of all are inside somewhere."""
+    n = 100_000 if full_size else 10_000
+    t = np.linspace(0.0025, 1, 400)
+    gp, (origins, directions) = process(kernel), along_x(n)
+    hits = gn.first_hits(gp, origins, directions, 1, sampler=sampler, seed=seed)
+    v = gn.line_values(gp, origins, directions, t, sampler=sampler, seed=seed)
+    free = np.isinf(hits["t"])
+    assert np.isfinite(v[free]).all()
+    assert np.sum(v[free].min(axis=1) < 0) < 1e-3 * n
+
+
+@pytest.mark.parametrize(("kernel", "sampler"), PAIRS)
+def test_reciprocity_of_free_flight(kernel, sampler, n, seed):
+    """Oracle 4: P(T <= t from a random outside point) = (crossing rate / P(f > 0)) ∫₀ᵗ S(s) ds, S of an excursion."""
+    from math import erf, sqrt
+
+    t, mean = 4.0, 0.3
+    gp, (origins, directions) = process(kernel, mean), along_x(n)
+    free = gn.first_hits(gp, origins, directions, t, sampler=sampler, seed=seed)["t"]
+    excursion = gn.first_hits(gp, origins, directions, t, memory="renewal", start=on_surface(n), sampler=sampler, seed=seed + 1)[
+        "t"
+    ]
+    rate = np.sqrt(gp_slope(kernel)) / (2 * np.pi) * np.exp(-(mean**2) / 2) / (0.5 * (1 + erf(mean / sqrt(2))))
+    lasted = np.minimum(excursion, t)
+    p = np.isfinite(free).mean()
+    check_z(p, rate * lasted.mean(), np.sqrt(p * (1 - p) / n + rate**2 * lasted.var() / n))
+
+
+def gp_slope(kernel):
+    return KERNELS[kernel](1.0).derivative_variance([1, 0, 0])
+
+
+@pytest.mark.parametrize(("kernel", "sampler"), PAIRS)
+def test_transverse_gradient_correlation(kernel, sampler, n, seed):
+    """Oracle 9: a remembered transverse gradient decays as c(q) = -κ'(q)/(qλ₂); Matérn 3/2 e^{-√3q}."""
+    start = np.array([0.7, 1.5, -2.0])
+    hits = gn.first_hits(process(kernel), *along_x(n), 9, start=on_surface(n, start), sampler=sampler, seed=seed)
+    hit = np.isfinite(hits["t"])
+    m, t = hit.sum(), hits["t"][hit]
+    lambda2 = gp_slope(kernel)
+    gradient = KERNELS[kernel](1.0).gradient(t[:, None] * [1.0, 0, 0], np.zeros((1, 3)))[:, 0, 0]
+    c = np.exp(-np.sqrt(3) * t) if kernel == "matern 3/2" else -gradient / (t * lambda2)
+    for axis in (1, 2):
+        scaled = (hits["gradient"][hit, axis] - c * start[axis]) / np.sqrt(lambda2 * (1 - c**2))
+        check_z(scaled.mean(), 0, 1 / np.sqrt(m))
+        check_z((scaled**2).mean(), 1, np.sqrt(2 / m))
+        check_z((scaled * c).mean(), 0, np.sqrt((c**2).mean() / m))
+
+
+@pytest.mark.parametrize("kernel", FAST)
+@pytest.mark.parametrize("memory", ["renewal", "renewal+", "none"])
+@pytest.mark.parametrize("scales", [[0.3, 0.15, 0.2], [0.6, 0.2, np.inf]])
+def test_samplers_agree(kernel, memory, scales, full_size, seed):
+    """Issue: two samplers, one law of (t, gradient) at the first and the second hit, over a sloping mean."""
+    m = 100_000 if full_size else 8_000
+    gp = gn.GaussianProcess(
+        gn.PlaneField([0, 0, 0], [0, 0.6, 0.8], 0.7),
+        0.12,
+        KERNELS[kernel](scales, rotation=[0.9, 0.3, -0.2, 0.1]),
+        bounds=((-1.5, -1.5, -1.5), (1.5, 1.5, 1.5)),
+    )
+    rng = np.random.default_rng(seed)
+    origins = np.column_stack([rng.uniform(-0.6, 0.6, (m, 2)), np.full(m, 3.0)])
+    directions = np.array([0.2, -0.1, -1.0]) + rng.normal(0, 0.05, (m, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    results = []
+    for i, sampler in enumerate((FAST[kernel], "dense")):
+        first = gn.first_hits(gp, origins, directions, 10, sampler=sampler, seed=seed + 10 * i)
+        hit = np.isfinite(first["t"])
+        normal = first["gradient"][hit] / np.linalg.norm(first["gradient"][hit], axis=1, keepdims=True)
+        d = directions[hit]
+        out = d - 2 * np.sum(d * normal, axis=1, keepdims=True) * normal
+        state = {key: value[hit] for key, value in first["state"].items()}
+        second = gn.first_hits(
+            gp, first["position"][hit], out, 10, memory=memory, start=state, sampler=sampler, seed=seed + 10 * i + 5
+        )
+        results.append((first, second))
+    for which, a, b in zip(("first", "second"), *results, strict=True):
+        check_same_distribution(a["t"], b["t"], f"{which} t")
+        for axis in range(3):
+            pair = [h["gradient"][np.isfinite(h["t"]), axis] for h in (a, b)]
+            check_same_distribution(*pair, f"{which} gradient {axis}")
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_automatic_choice(kernel):
+    chosen = process(kernel).plan()["sampler"]
+    assert chosen.startswith(FAST.get(kernel, "spectral")), chosen
+
+
+@pytest.mark.parametrize("sampler", ["convolution", "markov"])
+def test_a_sampler_refuses_what_it_does_not_serve(sampler):
+    with pytest.raises(ValueError, match=f"(?i){sampler} sampler serves"):
+        gn.first_hits(process("rational quadratic"), *along_x(1), 1, sampler=sampler)
+    with pytest.raises(ValueError, match=r"serves one radial correlation, not .*SquaredExponential\(1\) \+"):
+        kernel = gn.SquaredExponential(1) + gn.SquaredExponential(2)
+        gn.first_hits(gn.GaussianProcess(0, 1, kernel, bounds=LINE), *along_x(1), 1, sampler=sampler)
+
+
+@pytest.mark.parametrize("start", ["outside", "value"])
+def test_first_passage_of_matern_12(start, n, seed):
+    """Oracle 7: P(no sign change on [0, t]) = (2/π) arcsin e^{-t}, from g₀ = 1 erf(e^{-t}/√(2(1 - e^{-2t})))."""
+    from math import asin, erf, exp, pi, sqrt
+
+    gp = gn.GaussianProcess(0.0, 1.0, gn.Matern(0.5, 1.0))
+    state = {"value": np.ones(n), "gradient": np.zeros((n, 3))} if start == "value" else None
+    hits = gn.first_hits(gp, *along_x(n), 5, memory="renewal", start=state, seed=seed)
+    times = [0.03, 0.25, 1, 3]
+    outside = [2 / pi * asin(exp(-t)) for t in times]
+    value = [erf(exp(-t) / sqrt(2 * (1 - exp(-2 * t)))) for t in times]
+    check_proportion([np.sum(hits["t"] > t) for t in times], n, outside if start == "outside" else value)
+    assert np.isnan(hits["gradient"]).all()
+    with pytest.raises(ValueError, match="no ray can leave a point of its surface"):
+        gn.first_hits(gp, *along_x(1), 5, start=on_surface(1))

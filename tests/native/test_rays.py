@@ -1,0 +1,206 @@
+"""Rays of every kind against exact answers (design oracles, numbered as there): crossing rates, rays inside a body,
+height fields, visible normals, long free flights; and what stops a search that takes too long."""
+
+import signal
+from math import erf, exp, pi, sqrt
+
+import gpis_native as gn
+import numpy as np
+import pytest
+from statistics_checks import check_proportion, check_same_distribution, check_z
+
+pytestmark = pytest.mark.stats
+
+
+@pytest.fixture
+def n(full_size):
+    return 1_000_000 if full_size else 100_000
+
+
+def normal_cdf(x):
+    return 0.5 * (1 + erf(x / sqrt(2)))
+
+
+def density(x):
+    return exp(-x * x / 2) / sqrt(2 * pi)
+
+
+def rays(n, origin, direction):
+    direction = np.asarray(direction, float) / np.linalg.norm(direction)
+    return np.tile(np.asarray(origin, float), (n, 1)), np.tile(direction, (n, 1))
+
+
+@pytest.mark.parametrize("kernel", [gn.SquaredExponential([1.0, 0.5, 2]), gn.Matern(2.5, 1.0), gn.Wong(1.0)])
+def test_crossing_rate_over_a_sloping_mean_and_deviation(kernel, n, seed):
+    """Oracle 2: down-rate (1/σ)φ(μ/σ)[sφ(m/s) - mΦ(-m/s)], m = d·∇μ - (μ/σ)d·∇σ, over a stretch too short for two."""
+    n, h = 4 * n, 0.02
+    mean = gn.PlaneField([0, 0, 0], [1, 0, 0], -0.8) + gn.ConstantField(0.3)
+    sigma = (gn.PlaneField([0, 0, 0], [1, 0, 0], 0.7) + gn.ConstantField(0.5)).clamped(0, 2)
+    gp = gn.GaussianProcess(mean, sigma, kernel, bounds=((-1, -1, -1), (1, 1, 1)))
+    hits = gn.first_hits(gp, *rays(n, [0, 0, 0], [1, 0, 0]), h, seed=seed)
+    mu, s0 = 0.3 - 0.8 * h / 2, 0.5 + 0.7 * h / 2  # in the middle
+    m, s = -0.8 - mu / s0 * 0.7, s0 * sqrt(kernel.derivative_variance([1, 0, 0]))
+    rate = density(mu / s0) / s0 * (s * density(m / s) - m * normal_cdf(-m / s))
+    # Paths that cross twice on a stretch this short: about h² in relative terms, h for kernels without g''.
+    check_proportion(np.isfinite(hits["t"]).sum(), n, rate * h / normal_cdf(0.3 / 0.5), 0.005 * rate * h)
+
+
+@pytest.mark.parametrize("kernel", [gn.SquaredExponential(0.3), gn.Matern(1.5, 0.3)])
+@pytest.mark.parametrize("memory", ["none", "renewal", "renewal+"])
+def test_inside_is_outside_of_the_complement(kernel, memory, seed):
+    """Definitions B7: a ray inside f is a ray outside -f, start, slope and remembered gradient included."""
+    n, bounds = 3000, ((-1.5, -1.5, -1.5), (1.5, 1.5, 1.5))
+    rng = np.random.default_rng(seed)
+    origins, directions = rng.uniform(-0.3, 0.3, (n, 3)), rng.normal(size=(n, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    sphere = gn.SphereField([0, 0, 0], 1)
+    body = gn.GaussianProcess(sphere, 0.1, kernel, bounds=bounds)
+    complement = gn.GaussianProcess(-1 * sphere, 0.1, kernel, bounds=bounds)
+    inside = np.ones(n, bool)
+    a = gn.first_hits(body, origins, directions, 10, inside=inside, seed=seed)
+    b = gn.first_hits(complement, origins, directions, 10, seed=seed)
+    hit = np.isfinite(a["t"])
+    assert hit.mean() > 0.99
+    for step in range(2):
+        np.testing.assert_array_equal(a["t"], b["t"])
+        np.testing.assert_allclose(a["gradient"][hit], -b["gradient"][hit], atol=1e-12)
+        assert np.all(np.sum(a["gradient"][hit] * directions[hit], axis=1) >= 0)
+        if step == 1:
+            break
+        # Back into the body, by reflection at the surface that was met.
+        normal = a["gradient"][hit] / np.linalg.norm(a["gradient"][hit], axis=1, keepdims=True)
+        directions = directions[hit] - 2 * np.sum(directions[hit] * normal, axis=1, keepdims=True) * normal
+        origins, inside = a["position"][hit], inside[hit]
+        state = {key: value[hit] for key, value in a["state"].items()}
+        other = {key: -value for key, value in state.items()}
+        a = gn.first_hits(body, origins, directions, 10, memory=memory, start=state, inside=inside, seed=seed + 1)
+        b = gn.first_hits(complement, origins, directions, 10, memory=memory, start=other, seed=seed + 1)
+        hit = np.isfinite(a["t"])
+        assert hit.mean() > 0.5
+
+
+def test_inside_rays_leave_a_certain_ball(seed):
+    gp = gn.GaussianProcess(gn.SphereField([0, 0, 0], 1), 1e-9, gn.SquaredExponential(0.3))
+    hits = gn.first_hits(gp, *rays(5, [0.5, 0, 0], [1, 0, 0]), 10, inside=np.array([1, 1, 0, 1, 1], bool), seed=seed)
+    np.testing.assert_allclose(np.delete(hits["t"], 2), 0.5, atol=1e-7)
+    with pytest.raises(ValueError, match="inside must be an array of truth values"):
+        gn.first_hits(gp, *rays(2, [0, 0, 0], [1, 0, 0]), 10, inside=[True])
+    with pytest.raises(ValueError, match="negative for rays inside"):
+        start = {"value": [0.1], "gradient": [[1.0, 0, 0]]}
+        gn.first_hits(gp, *rays(1, [0, 0, 0], [1, 0, 0]), 10, start=start, inside=np.array([True]))
+
+
+@pytest.mark.parametrize("family", [gn.SquaredExponential, lambda *a: gn.Matern(1.5, *a), gn.Wong])
+def test_along_the_constant_axis_of_a_height_field(family, n, seed):
+    """An infinite length: f = μ + σg with one g for the ray, so the height of the hit is normal."""
+    gp = gn.GaussianProcess(
+        gn.PlaneField([0, 0, 0], [0, 0, 1], 0.5), 0.1, family([0.3, 0.2, np.inf]), bounds=((-2, -2, -2), (2, 2, 2))
+    )
+    hits = gn.first_hits(gp, *rays(n, [0.1, 0.2, 3], [0, 0, -1]), 10, seed=seed)
+    assert np.isfinite(hits["t"]).all()
+    check_same_distribution((hits["t"] - 3) * 5, np.random.default_rng(seed).normal(size=n))
+    # ∇g has no part along the axis, and the deviation √λ₂/ℓ across it.
+    np.testing.assert_allclose(hits["gradient"][:, 2], 0.5, atol=1e-12)
+    lambda2 = family(1.0).derivative_variance([1, 0, 0])
+    for axis, length in ((0, 0.3), (1, 0.2)):
+        check_z((hits["gradient"][:, axis] ** 2).mean() / (0.01 * lambda2 / length**2), 1, sqrt(2 / n))
+    # Up again from the hit the surface is never met: f only grows.
+    up = gn.first_hits(gp, hits["position"], -rays(n, [0, 0, 0], [0, 0, -1])[1], 9, start=hits["state"], seed=seed)
+    assert np.isinf(up["t"]).all()
+
+
+@pytest.mark.parametrize("lengths", [[0.3, np.inf, 0.2], [0.3, np.inf, np.inf]])
+def test_a_mirror_of_a_grooved_surface(lengths):
+    """Gradients in a plane or on a line have no density: a mirror must not be lit through one."""
+    description = {
+        "version": 1,
+        "settings": {},
+        "camera": {"type": "orthographic", "matrix": np.eye(4) + 3 * np.eye(4)[:, [0, 1, 3, 2]] * [0, 0, 0, 1], "width": 1},
+        "world": {"color": [1, 1, 1]},
+        "lights": [],
+        "materials": {"mirror": {"type": "mirror", "color": [1, 1, 1]}},
+        "meshes": {},
+        "objects": [
+            {
+                "name": "grooves",
+                "type": "gpis",
+                "process": gn.GaussianProcess(
+                    gn.PlaneField([0, 0, 0], [0, 0, 1], 1),
+                    0.02,
+                    gn.SquaredExponential(lengths),
+                    bounds=((-1, -1, -1), (1, 1, 1)),
+                ),
+                "matrix": np.eye(4),
+                "materials": ["mirror"],
+            }
+        ],
+    }
+    combined = gn.render(gn.Scene(description), 8, 8, samples=16).passes["combined"]
+    np.testing.assert_allclose(combined, 1, atol=1e-6)
+
+
+def visible_cosine(direction, slope, edges, rng, height_field, n=1_000_000):
+    """Histogram of n·ω where gradients follow (-d·g)₊ N(g; ∇μ, s²I), across the plane alone for a height field."""
+    gradient = np.array([0, 0, 1]) + slope * rng.normal(size=(n, 3)) * [1, 1, 0 if height_field else 1]
+    towards = -gradient @ direction
+    histogram, _ = np.histogram(towards / np.linalg.norm(gradient, axis=1), edges, weights=np.maximum(towards, 0))
+    return histogram / histogram.sum()
+
+
+@pytest.mark.parametrize("kernel", ["height field", "isotropic"])
+@pytest.mark.parametrize("degrees", [15, 45, 70])
+def test_visible_normals(kernel, degrees, n, seed):
+    """Oracle 12: total variation of n·ω below .01 (.02 for α = 1) up to 45°; grazing measured, its departures are real."""
+    theta, edges = np.radians(degrees), np.linspace(0, 1, 21)
+    direction = np.array([-np.sin(theta), 0, -np.cos(theta)])
+    scale = [0.1, 0.1, np.inf] if kernel == "height field" else 0.1
+    for alpha, bound in ((0.1, 0.01), (0.5, 0.01), (1, 0.02)):
+        sigma = alpha * 0.1 / np.sqrt(2)
+        gp = gn.GaussianProcess(gn.PlaneField([0, 0, 0], [0, 0, 1], 1), sigma, gn.SquaredExponential(scale))
+        hits = gn.first_hits(gp, *rays(n, -3 * direction, direction), 10, seed=seed)
+        hit = np.isfinite(hits["t"])
+        assert hit.mean() > 0.9999
+        seen = -hits["gradient"][hit] @ direction / np.linalg.norm(hits["gradient"][hit], axis=1)
+        assert np.all(seen >= 0)
+        got = np.histogram(seen, edges)[0] / hit.sum()
+        expected = visible_cosine(direction, sigma / 0.1, edges, np.random.default_rng(seed), kernel == "height field")
+        variation = 0.5 * np.abs(got - expected).sum()
+        print(f"{kernel}, {degrees} degrees, alpha {alpha}: total variation {variation:.4f}")
+        assert variation < (bound if degrees <= 45 else 0.035)
+
+
+@pytest.mark.parametrize("kernel", [gn.SquaredExponential(0.01), gn.Matern(2.5, 0.01)])
+def test_rare_hits_are_exponential(kernel, seed):
+    """Oracle 16: μ = 3σ, free flights of rate ν/Φ(μ/σ), ν the one-sided Rice rate."""
+    n = 4000
+    gp = gn.GaussianProcess(3.0, 1.0, kernel)
+    hits = gn.first_hits(gp, *rays(n, [0, 0, 0], [1, 0, 0]), 10, seed=seed)
+    rate = sqrt(kernel.derivative_variance([1, 0, 0])) / (2 * pi) * exp(-4.5) / normal_cdf(3)
+    t = np.array([1.0, 3.0, 6.0, 9.0])
+    # Paths that dip below 0 often do so twice: .5% of the rate at this height.
+    survival = np.exp(-rate * t)
+    check_proportion([np.sum(hits["t"] > s) for s in t], n, survival, 0.01 * rate * t * survival)
+
+
+def test_ctrl_c_ends_a_long_search():
+    """The calling thread listens while the rays are marched, and a ray notices in the middle of its line."""
+    gp = gn.GaussianProcess(1.0, 0.1, gn.SquaredExponential(1e-6), bounds=((-1, -1, -1), (1, 1, 1)))
+
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, interrupt)
+    signal.setitimer(signal.ITIMER_REAL, 0.3)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            gn.first_hits(gp, *rays(1_000_000, [-1, 0, 0], [1, 0, 0]), 2, tolerance=1e-300)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def test_the_plan_warns_of_lines_that_take_long():
+    bounds = ((-1, -1, -1), (1, 1, 1))
+    warning = gn.GaussianProcess(1.0, 0.1, gn.SquaredExponential(1e-6), bounds=bounds).plan()["warning"]
+    assert "longer length_scale or smaller bounds" in warning
+    assert "warning" not in gn.GaussianProcess(1.0, 0.1, gn.SquaredExponential(1e-3), bounds=bounds).plan()

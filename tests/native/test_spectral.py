@@ -1,0 +1,201 @@
+"""The spectral sampler as a render uses it: implied correlation against the kernel, and exact answers (design oracles,
+numbered as there). The joint law of value and gradient is tested in test_spectral.cpp."""
+
+import math
+
+import gpis_native as gn
+import numpy as np
+import pytest
+from statistics_checks import check_proportion, check_same_distribution, check_z
+
+pytestmark = pytest.mark.stats
+BOUNDS = ((-4, -4, -4), (4, 4, 4))
+DIRECTION = np.array([0.48, -0.64, 0.6])
+ORIGIN = np.array([-1.5, 2.0, -1.0])
+LENGTHS, ROTATION = [0.6, 1.0, 1.7], [0.9, 0.3, -0.2, 0.1]
+
+SE = gn.SquaredExponential(LENGTHS, rotation=ROTATION)
+PERIODIC = gn.LocallyPeriodic(1.5, 0.9, [0, 0.6, 0.8], 0.8)  # its axis turned against the ray
+WAVE = gn.PlaneWave([2.0, 0.5, 1.0])
+KERNELS = {
+    "squared exponential": SE,
+    **{f"rational quadratic {a}": gn.RationalQuadratic(a, LENGTHS, rotation=ROTATION) for a in (0.3, 0.5, 1, 2)},
+    "locally periodic": PERIODIC,
+    "plane wave": WAVE,
+    "sum": 0.4 * SE + 0.6 * gn.RationalQuadratic(1, 0.5),
+    "sum with a wave": 0.3 * WAVE + 0.7 * PERIODIC,
+    "product": WAVE * gn.RationalQuadratic(0.5, 0.8) * gn.PlaneWave([0, 1, 0]),
+    "height field": gn.RationalQuadratic(1, [0.5, 0.7, math.inf]),
+}
+# What the sampler states of its own: 1e-5 of the correlation, 3e-5 with a rational quadratic, and 1e-4 of the slopes.
+STATED = 4e-5
+STATED_SLOPES = 1e-4
+parametrize = pytest.mark.parametrize("name", KERNELS)
+
+
+@pytest.fixture
+def n(full_size):
+    return 1_000_000 if full_size else 40_000
+
+
+def rays(n):
+    return np.tile(ORIGIN, (n, 1)), np.tile(DIRECTION, (n, 1))
+
+
+def derivative_deviation(kernel):
+    return math.sqrt(kernel.derivative_variance(DIRECTION))
+
+
+@parametrize
+@pytest.mark.parametrize("start", ["outside", "value and gradient"])
+def test_implied_correlation(name, start, n, seed):
+    """Values that a render's own line takes, over many cells. The mean of 5 deviations keeps every path outside; the
+    tolerance makes the sampler draw there."""
+    kernel = KERNELS[name]
+    gp = gn.GaussianProcess(5.0, 1.0, kernel, bounds=BOUNDS)
+    t = np.array([0.02, 0.1, 0.3, 0.7, 1.1, 1.9, 3.1])
+    points = ORIGIN + t[:, None] * DIRECTION
+    covariance, mean = kernel(points, points), np.zeros(len(t))
+    state = None
+    if start != "outside":
+        # (g, ∇g) at the start; the gradient one that the process can have.
+        at = ORIGIN[None]
+        g = kernel.mixed(at, at)[0, 0]
+        values, vectors = np.linalg.eigh(g)
+        root = vectors * np.sqrt(np.where(values > 1e-12 * values[-1], values, 0))
+        gradient = root @ np.array([0.5, -0.3, 0.4])
+        across = np.concatenate([kernel(points, at), -kernel.gradient(points, at)[:, 0]], axis=1)
+        inverse = np.zeros((4, 4))
+        inverse[0, 0] = 1 / kernel.variance
+        inverse[1:, 1:] = np.linalg.pinv(g, rcond=1e-10)
+        mean = across @ inverse @ np.concatenate([[0.5], gradient])
+        covariance = covariance - across @ inverse @ across.T
+        state = {"value": np.full(n, 5.5), "gradient": np.tile(gradient, (n, 1))}
+    g = gn.line_values(gp, *rays(n), t, start=state, tolerance=1e-6, sampler="spectral", seed=seed) - 5
+    g = g[np.isfinite(g).all(axis=1)]
+    assert len(g) > 0.999 * n
+    m, deviation = len(g), np.sqrt(np.maximum(np.diag(covariance), 1e-16))
+    check_z(g.mean(axis=0), mean, deviation / np.sqrt(m), "mean")
+    centred = g - mean
+    outer = np.outer(deviation, deviation)
+    error = np.sqrt((outer**2 + covariance**2) / m)
+    difference = np.abs(centred.T @ centred / m - covariance) - STATED * np.add.outer(deviation, deviation)
+    check_z(np.maximum(difference, 0), 0, error, "covariance")
+
+
+@pytest.mark.parametrize(
+    ("start", "memory", "survival"),
+    [
+        ("outside", "renewal+", [0.84229, 0.69407, 0.45573, 0.12893, 0.03639]),
+        ("surface", "renewal", [0.96922, 0.88063, 0.61086, 0.17080, 0.04818]),
+        ("slope 1", "renewal+", [0.99669, 0.88074, 0.58803, 0.16682, 0.04701]),
+    ],
+)
+def test_survival_of_the_squared_exponential(start, memory, survival, n, seed):
+    """Oracle 6: brute force over 1.4 million paths, standard error 4e-4."""
+    gp = gn.GaussianProcess(0, 1, gn.SquaredExponential(1), bounds=((-1, -1, -1), (12, 1, 1)))
+    state = None
+    if start != "outside":
+        state = {"value": np.zeros(n), "gradient": np.tile([1.0, 0.3, -0.2], (n, 1))}
+    along = np.zeros((n, 3)), np.tile([1.0, 0, 0], (n, 1))
+    hits = gn.first_hits(gp, *along, 9, memory=memory, start=state, sampler="spectral", seed=seed)
+    check_proportion([np.sum(hits["t"] > t) for t in [0.5, 1, 2, 5, 8]], n, survival, 4e-4, start)
+
+
+def test_plane_wave(n, seed):
+    """Oracle 15: T = 1 - wt/π from outside, excursions of π/w exactly, whatever the memory."""
+    gp = gn.GaussianProcess(0, 1, WAVE, bounds=((-40, -40, -40), (40, 40, 40)))
+    w = abs(np.array([2.0, 0.5, 1.0]) @ DIRECTION)
+    hits = gn.first_hits(gp, *rays(n), 30, seed=seed)
+    t = np.array([0.1, 0.25, 0.5, 0.75, 0.9]) * math.pi / w
+    check_proportion([np.sum(hits["t"] > x) for x in t], n, 1 - w * t / math.pi, 0.0, "from outside")
+    assert hits["t"].max() <= math.pi / w * (1 + 1e-12)
+    wave_vector = np.array([2.0, 0.5, 1.0])
+    state = {"value": np.zeros(50), "gradient": np.tile(np.sign(wave_vector @ DIRECTION) * wave_vector, (50, 1))}
+    for memory in ["renewal", "renewal+"]:
+        again = gn.first_hits(gp, *rays(50), 30, start=state, memory=memory, seed=seed)
+        np.testing.assert_allclose(again["t"], math.pi / w, rtol=1e-9)
+    # Across the wave g is constant: no ray ever hits.
+    across = np.cross(wave_vector, DIRECTION) / np.linalg.norm(np.cross(wave_vector, DIRECTION))
+    none = gn.first_hits(gp, rays(50)[0], np.tile(across, (50, 1)), 30, seed=seed)
+    assert np.isinf(none["t"]).all()
+
+
+@parametrize
+@pytest.mark.parametrize("level", [0.0, 1.0])
+def test_rate_and_gradients_of_crossings(name, level, n, seed):
+    """Oracle 2 within a short step from a random outside point, and the law of the gradient there: of density
+    proportional to (-d·g)₊ N(g; 0, G), so that E[g gᵀ] = G + G d dᵀG/(dᵀGd) (definitions E2: all three components)."""
+    kernel = KERNELS[name]
+    variance, s = kernel.variance, derivative_deviation(kernel)
+    gp = gn.GaussianProcess(level, 1.0, kernel, bounds=BOUNDS)
+    t = 0.15 * math.sqrt(variance) / s
+    hits = gn.first_hits(gp, *rays(n), t, sampler="spectral", seed=seed)
+    hit = np.isfinite(hits["t"])
+    outside = 0.5 * math.erfc(-level / math.sqrt(2 * variance))
+    rate = s / (2 * math.pi * math.sqrt(variance)) * math.exp(-0.5 * level**2 / variance) / outside
+    # Two crossings within the step: below 2e-3 of the rate for the squared exponential, .01 for the roughest here.
+    check_proportion(hit.sum(), n, rate * t, 0.01 * rate * t, "rate")
+    g = kernel.mixed([[0, 0, 0]], [[0, 0, 0]])[0, 0]
+    along = g @ DIRECTION
+    expected = g + np.outer(along, along) / s**2
+    products = hits["gradient"][hit][:, :, None] * hits["gradient"][hit][:, None, :]
+    scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+    # First crossings from outside are all but .01 of the crossings.
+    difference = np.maximum(np.abs(products.mean(axis=0) - expected) - 0.02 * scale, 0)
+    check_z(difference, 0, products.std(axis=0) / math.sqrt(hit.sum()) + 1e-9 * scale.max(), "gradient")
+    assert (hits["gradient"][hit] @ DIRECTION < 0).all()
+
+
+def test_against_convolution(n, seed):
+    """The same process by two samplers that share no code, from a remembered gradient, over a sloping mean."""
+    gp = gn.GaussianProcess(gn.PlaneField([0, 0, 0], [0.3, 0.2, 0.9], 0.5), 1, SE, bounds=BOUNDS)
+    state = {"value": np.zeros(n), "gradient": np.tile([0.6, -0.9, 1.4], (n, 1))}
+    found = {}
+    for i, sampler in enumerate(["spectral", "convolution"]):
+        found[sampler] = gn.first_hits(gp, *rays(n), 5, start=state, sampler=sampler, seed=seed + 7 * i)
+    a, b = found["spectral"], found["convolution"]
+    check_same_distribution(a["t"], b["t"], "t")
+    for i in range(3):
+        kept = [np.isfinite(x["t"]) for x in (a, b)]
+        check_same_distribution(a["gradient"][kept[0], i], b["gradient"][kept[1], i], f"gradient {i}")
+
+
+def test_counters():
+    """No factorisation per ray; a line longer than the tables is counted, others are not."""
+    n = 200
+    along = np.zeros((n, 3)), np.tile([0.0, 0, 1], (n, 1))
+    kernel = gn.RationalQuadratic(1, 0.5)
+    bounded = gn.first_hits(gn.GaussianProcess(2, 1, kernel, bounds=BOUNDS), *along, 100)["counters"]
+    assert bounded["line_normals"] > 50 * n
+    assert bounded["factorisations"] == bounded["line_reach_limit"] == 0
+    endless = gn.first_hits(gn.GaussianProcess(2, 1, kernel), *along, 1000)["counters"]
+    assert endless["line_reach_limit"] == n
+    # More of the line is uncertain than one table holds: it takes the next.
+    longer = gn.GaussianProcess(2, 1, kernel, bounds=((-1, -1, -1), (1, 1, 30)))
+    assert gn.first_hits(longer, *along, 100)["counters"]["line_normals"] > 1.5 * bounded["line_normals"]
+
+
+def test_choice():
+    def sampler(kernel):
+        return gn.GaussianProcess(0, 1, kernel, bounds=BOUNDS).plan()["sampler"]
+
+    assert "convolution" in sampler(SE)
+    for name, kernel in KERNELS.items():
+        if name != "squared exponential":
+            assert "spectral" in sampler(kernel), name
+
+
+@pytest.mark.parametrize(
+    ("kernel", "message"),
+    [
+        (gn.Matern(1.5, 1), "spectral sampler does not serve Matern.1.5, 1.: a part of it is rough"),
+        (gn.RationalQuadratic(1, 1) * SE, "it is no sum of independent terms"),
+        (gn.RationalQuadratic(1e-5, 1), "take a larger alpha"),
+        (gn.LocallyPeriodic(0.001, 1, [1, 0, 0], 0.01), "waves for this kernel"),
+    ],
+)
+def test_refused(kernel, message):
+    gp = gn.GaussianProcess(0, 1, kernel, bounds=BOUNDS)
+    with pytest.raises(ValueError, match=message):
+        gn.first_hits(gp, np.zeros((1, 3)), [[0.0, 0, 1]], 1, sampler="spectral")
