@@ -41,6 +41,7 @@ void RealisationPath::reset(const Plan& plan, const LineGeometry& line, double a
   drawn_ = false;
   pull_ = 0;
   entry_ = own_ = {};
+  sign_ = kept_sign_;
   realisation_ = nullptr;
   for (const Pool& entry : pool_)
     if (entry.plan == &plan) realisation_ = entry.realisation.get();

@@ -27,7 +27,7 @@ class RealisationPath {
   // of a ray inside the body, which sees -f and so -g.
   void keep(RealisationMemory* kept, bool inside) {
     kept_ = kept;
-    sign_ = inside && kept ? -1 : 1;
+    kept_sign_ = inside && kept ? -1 : 1;
   }
 
   void reset(const Plan& plan, const LineGeometry& line, double anchor, double t_end,
@@ -62,7 +62,7 @@ class RealisationPath {
   std::vector<Pool> pool_;  // one for each object that this line was used for
   Realisation* realisation_ = nullptr;
   RealisationMemory* kept_ = nullptr;
-  double sign_ = 1;
+  double kept_sign_ = 1, sign_ = 1;  // of the next line, and of this one
   LineGeometry line_;
   double anchor_ = 0, step_ = 1, deviation_ = 0, pull_ = 0;
   bool drawn_ = false;

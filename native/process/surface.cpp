@@ -58,9 +58,6 @@ ProcessSurface::ProcessSurface(std::shared_ptr<const GaussianProcess> process,
 
 void ProcessSurface::serve_inside() {
   if (planned_inside_) return;
-  if (memory_ == Memory::global)
-    throw std::invalid_argument(
-        "Rays inside a body do not know memory 'global': take 'renewal+', 'renewal' or 'none'.");
   planned_inside_ = std::make_shared<PlannedLine>(
       plan_line(inside_out(*planned_->process), sampler_, missed_root_));
 }

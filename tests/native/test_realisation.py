@@ -211,3 +211,37 @@ def test_refusals_and_cancel():
     # A kernel without gradient still has values.
     v = process(gn.Matern(0.5, 1.0)).realisation_at([[0.0, 0, 0], [1, 0, 0]], n=4000)["value"]
     check_z(np.mean(v[:, 0] * v[:, 1]), np.exp(-1), np.sqrt((1 + np.exp(-2)) / 4000))
+
+
+def varying_process(mean=0.0, sigma=1.0):
+    """Length scales that grow, with axes that turn, on a grid."""
+    axis = np.linspace(-1, 1, 9)
+    x, y, _ = np.meshgrid(axis, axis, axis, indexing="ij")
+    l2 = 0.25 * np.exp(0.5 * x)
+    a = np.stack([l2, 0.6 * l2, 1.2 * l2, 0.2 * l2 * y, 0 * l2, 0.1 * l2], axis=-1)
+    field = gn.TensorGridField(a, 0.25, [-1, -1, -1])
+    return gn.GaussianProcess(mean, sigma, gn.SquaredExponential(1.0), anisotropy=field, bounds=BOX)
+
+
+def test_varying_length_scales(full_size, seed):
+    """C11 against C10: values and gradients have the covariance of Paciorek and Schervish; grid and points agree."""
+    n = 40_000 if full_size else 2000
+    gp = varying_process()
+    points = np.array([[0.1, 0.2, -0.3], [0.3, 0.1, -0.2], [-0.6, 0.3, 0.4]])
+    at = gp.realisation_at(points, seed, n)
+    values = np.concatenate([at["value"][..., None], at["gradient"]], axis=-1).reshape(n, -1)
+    expected = gp.joint_covariance(points, points).transpose(0, 2, 1, 3).reshape(12, 12)
+    deviation = np.sqrt(np.diag(expected))
+    error = np.sqrt((np.outer(deviation, deviation) ** 2 + expected**2) / n)
+    check_z(values.T @ values / n, expected, error, "covariance")
+    grid = gp.realisation(BOX, 8, seed)
+    index = np.array([[1, 2, 3], [6, 5, 4]])
+    nodes = np.array(grid["origin"]) + index * grid["voxel_size"]
+    assert np.allclose(grid["realisation"][tuple(index.T)], gp.realisation_at(nodes, seed)["value"][0], atol=1e-5)
+    with pytest.raises(ValueError, match="takes the squared exponential"):
+        gn.GaussianProcess(
+            0.0,
+            1.0,
+            gn.Matern(1.5, 1.0),
+            anisotropy=gn.TensorGridField(np.tile([1.0, 1, 1, 0, 0, 0], (2, 2, 2, 1)), 1, [0, 0, 0]),
+        ).realisation(BOX, 4)

@@ -256,3 +256,21 @@ def test_refusals():
     start = {"value": np.zeros(2), "gradient": np.ones((2, 3)), "realisation": {"seed": np.zeros(2, np.uint64)}}
     with pytest.raises(ValueError, match=r"start\['realisation'\]"):
         gn.first_hits(gp, *rays, 5, memory="global", start=start)
+
+
+def test_rays_inside_see_the_same_realisation(seed):
+    """Memory global: a ray that enters the body (a dielectric) leaves it where that very realisation does."""
+    n = 60
+    gp = gn.GaussianProcess(gn.SphereField([0, 0, 0], 1), 0.1, gn.SquaredExponential(0.3), bounds=SPHERE_BOX)
+    rng = np.random.default_rng(seed)
+    origins = np.column_stack([rng.uniform(-0.5, 0.5, (n, 2)), np.full(n, 3.0)])
+    down = np.tile([0.0, 0, -1], (n, 1))
+    first = select(gn.first_hits(gp, origins, down, 10, memory="global", seed=seed), slice(None))
+    leave = gn.first_hits(
+        gp, first["position"], down, 10, memory="global", start=first["state"], inside=np.ones(n, bool), seed=seed
+    )
+    assert np.isfinite(leave["t"]).all()
+    for i in range(n):
+        at = gp.realisation_at(leave["position"][i : i + 1], int(first["state"]["realisation"]["seed"][i]))
+        assert abs(at["value"][0, 0]) < 1e-6
+        assert np.allclose(at["gradient"][0, 0], leave["gradient"][i], atol=1e-5) and leave["gradient"][i, 2] < 0
