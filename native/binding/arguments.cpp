@@ -26,6 +26,12 @@ Memory memory_argument(const std::string& value, const std::string& name) {
                               "', it takes 'none', 'renewal', 'renewal+' or 'global'.");
 }
 
+TreePtr tree_argument(const py::handle& value, const std::string& name) {
+  if (py::isinstance<ProcessTree>(value)) return value.cast<std::shared_ptr<ProcessTree>>();
+  return ProcessTree::single(
+      instance_argument<GaussianProcess>(value, name, "a GaussianProcess or a CSG tree of them"));
+}
+
 std::string path_argument(const py::handle& value, const std::string& name) {
   PyObject* encoded = nullptr;
   if (!PyUnicode_FSConverter(value.ptr(), &encoded)) {

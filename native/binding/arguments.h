@@ -10,6 +10,7 @@
 #include "core/counters.h"
 #include "field/field.h"
 #include "process/gaussian_process.h"
+#include "process/tree.h"
 
 namespace gpis {
 
@@ -32,6 +33,9 @@ std::shared_ptr<T> instance_argument(const pybind11::handle& value, const std::s
       name + " must be " + takes + ", it is a " +
       pybind11::str(pybind11::type::handle_of(value).attr("__name__")).cast<std::string>() + ".");
 }
+
+// A GaussianProcess, as a tree of one leaf, or a CSG tree.
+TreePtr tree_argument(const pybind11::handle& value, const std::string& name);
 
 // A path as Python's open takes it (str, bytes, os.PathLike).
 std::string path_argument(const pybind11::handle& value, const std::string& name);

@@ -11,7 +11,7 @@
 #include "process/at_points.h"
 #include "process/covariance.h"
 #include "process/first_hits.h"
-#include "process/surface.h"
+#include "process/tree_surface.h"
 
 namespace gpis {
 namespace py = pybind11;
@@ -85,8 +85,9 @@ Sampler sampler_argument(const std::string& name) {
 }
 
 // What rows have seen of their realisations, memory `global`: seed (N,), and where they were moved
-// outside, point (N, 3), value (N,), NaN where they were not.
-std::vector<RealisationMemory> realisations_argument(const py::handle& argument, std::size_t n) {
+// outside, point (N, 3), value (N,), NaN where they were not; of a tree for each of its leaves.
+std::vector<RealisationMemory> realisations_argument(const py::handle& argument, std::size_t n,
+                                                     std::size_t leaves) {
   constexpr const char* sentence =
       "start['realisation'] must be a dict of seed (N,), entry (N, 3) and shift (N,), as in the "
       "state of earlier hits.";
@@ -97,32 +98,39 @@ std::vector<RealisationMemory> realisations_argument(const py::handle& argument,
   const auto seed =
       py::array_t<std::uint64_t, py::array::c_style | py::array::forcecast>::ensure(dict["seed"]);
   const Array entry = Array::ensure(dict["entry"]), shift = Array::ensure(dict["shift"]);
-  if (!seed || !entry || !shift || seed.ndim() != 1 || entry.ndim() != 2 || shift.ndim() != 1 ||
-      entry.shape(1) != 3 || static_cast<std::size_t>(seed.shape(0)) != n ||
-      static_cast<std::size_t>(entry.shape(0)) != n ||
-      static_cast<std::size_t>(shift.shape(0)) != n) {
+  const auto count = static_cast<py::ssize_t>(n * leaves);
+  const py::ssize_t rank = leaves > 1 ? 2 : 1;
+  if (!seed || !entry || !shift || seed.ndim() != rank || shift.ndim() != rank ||
+      entry.ndim() != rank + 1 || entry.shape(rank) != 3 || seed.size() != count ||
+      shift.size() != count || entry.size() != 3 * count) {
     PyErr_Clear();
     throw std::invalid_argument(sentence);
   }
-  std::vector<RealisationMemory> out(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    out[i].seed = seed.at(i);
-    if (std::isfinite(shift.at(i)))
-      out[i].entry = {true, {entry.at(i, 0), entry.at(i, 1), entry.at(i, 2)}, {shift.at(i), {}}};
+  std::vector<RealisationMemory> out(count);
+  for (py::ssize_t i = 0; i < count; ++i) {
+    out[i].seed = seed.data()[i];
+    const double* at = entry.data() + 3 * i;
+    if (std::isfinite(shift.data()[i]))
+      out[i].entry = {true, {at[0], at[1], at[2]}, {shift.data()[i], {}}};
   }
   return out;
 }
 
-py::dict realisations_dict(const std::vector<RealisationMemory>& realisations) {
+py::dict realisations_dict(const std::vector<RealisationMemory>& realisations, py::ssize_t leaves) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-  const auto n = static_cast<py::ssize_t>(realisations.size());
-  py::array_t<std::uint64_t> seed(n);
-  Array entry({n, py::ssize_t{3}}), shift(n);
-  for (py::ssize_t i = 0; i < n; ++i) {
+  const auto count = static_cast<py::ssize_t>(realisations.size());
+  std::vector<py::ssize_t> shape{count / leaves};
+  if (leaves > 1) shape.push_back(leaves);
+  py::array_t<std::uint64_t> seed(shape);
+  Array shift(shape);
+  shape.push_back(3);
+  Array entry(shape);
+  for (py::ssize_t i = 0; i < count; ++i) {
     const RealisationMemory& r = realisations[i];
-    seed.mutable_at(i) = r.seed;
-    shift.mutable_at(i) = r.entry.active ? r.entry.weight.value : nan;
-    for (int k = 0; k < 3; ++k) entry.mutable_at(i, k) = r.entry.active ? r.entry.at[k] : nan;
+    seed.mutable_data()[i] = r.seed;
+    shift.mutable_data()[i] = r.entry.active ? r.entry.weight.value : nan;
+    for (int k = 0; k < 3; ++k)
+      entry.mutable_data()[3 * i + k] = r.entry.active ? r.entry.at[k] : nan;
   }
   return py::dict("seed"_a = seed, "entry"_a = entry, "shift"_a = shift);
 }
@@ -134,8 +142,43 @@ double tolerance_argument(double tolerance) {
   return tolerance;
 }
 
+// value (N,) and gradient (N, 3); of a tree (N, leaves) and (N, leaves, 3), NaN where nothing is
+// known.
+void read_start(const py::handle& values, const py::handle& gradients, std::size_t leaves,
+                FirstHitsQuery& query) {
+  const Array value = Array::ensure(values), gradient = Array::ensure(gradients);
+  const auto rays = static_cast<py::ssize_t>(query.rays.size());
+  const auto count = static_cast<py::ssize_t>(leaves);
+  const bool tree = leaves > 1;
+  const bool fits = value && gradient && value.ndim() == 1 + tree && gradient.ndim() == 2 + tree &&
+                    value.shape(0) == rays && gradient.shape(0) == rays &&
+                    gradient.shape(1 + tree) == 3 &&
+                    (!tree || (value.shape(1) == count && gradient.shape(1) == count));
+  if (!fits) {
+    PyErr_Clear();
+    const std::string n = tree ? "(N, " + std::to_string(leaves) : "(N";
+    throw std::invalid_argument("start must hold value " + n + (tree ? ")" : ",)") +
+                                " and gradient " + n + ", 3), one row a ray.");
+  }
+  const double *v = value.data(), *g = gradient.data();
+  for (py::ssize_t i = 0; i < rays * count; ++i, ++v, g += 3) {
+    const Vec3 at{g[0], g[1], g[2]};
+    const bool nothing = tree && std::isnan(*v);
+    const bool inside = !query.inside.empty() && query.inside[i / count];
+    if (!nothing && (!std::isfinite(*v) || (!tree && (inside ? -*v : *v) < 0)))
+      throw std::invalid_argument(
+          "start['value'][" + std::to_string(i / count) +
+          "] must be 0 (on the surface) or positive (outside; negative for rays inside), and "
+          "finite.");
+    if (!nothing && !is_finite(at))
+      throw std::invalid_argument("start['gradient'][" + std::to_string(i / count) +
+                                  "] is not finite: every coordinate must be a number.");
+    query.start.push_back({*v, at});
+  }
+}
+
 FirstHitsQuery query_argument(const py::object& origins, const py::object& directions, double t_max,
-                              const py::object& start, const py::object& inside,
+                              const py::object& start, const py::object& inside, std::size_t leaves,
                               std::uint64_t first_index, std::uint64_t seed, int threads) {
   FirstHitsQuery query;
   const auto o = points_argument(origins, "origins"), d = points_argument(directions, "directions");
@@ -176,22 +219,9 @@ FirstHitsQuery query_argument(const py::object& origins, const py::object& direc
     }
     if (!s.contains("value") || !s.contains("gradient"))
       throw std::invalid_argument("start must hold value (N,) and gradient (N, 3).");
-    const Array value = Array::ensure(s["value"]);
-    const auto gradient = points_argument(s["gradient"], "start['gradient']");
-    if (!value || value.ndim() != 1 || static_cast<std::size_t>(value.shape(0)) != o.size() ||
-        gradient.size() != o.size())
-      throw std::invalid_argument("start must hold value (N,) and gradient (N, 3), one row a ray.");
-    for (std::size_t i = 0; i < o.size(); ++i) {
-      const double out = !query.inside.empty() && query.inside[i] ? -value.at(i) : value.at(i);
-      if (!(out >= 0) || std::isinf(out))
-        throw std::invalid_argument(
-            "start['value'][" + std::to_string(i) +
-            "] must be 0 (on the surface) or positive (outside; negative for rays inside), and "
-            "finite.");
-      query.start.push_back({value.at(i), gradient[i]});
-    }
+    read_start(s["value"], s["gradient"], leaves, query);
     if (s.contains("realisation"))
-      query.realisation = realisations_argument(s["realisation"], o.size());
+      query.realisation = realisations_argument(s["realisation"], o.size(), leaves);
   }
   query.t_max = t_max;
   query.first_index = first_index;
@@ -209,11 +239,11 @@ py::dict first_hits_dict(const py::object& gp, const py::object& origins,
                          const py::object& start, const py::object& inside,
                          std::uint64_t first_index, const std::string& sampler, double tolerance,
                          std::uint64_t seed, int threads) {
-  const auto process = instance_argument<GaussianProcess>(gp, "gp", "a GaussianProcess");
-  const FirstHitsQuery query =
-      query_argument(origins, directions, t_max, start, inside, first_index, seed, threads);
-  ProcessSurface surface(process, {}, memory_argument(memory, "memory"), sampler_argument(sampler),
-                         tolerance_argument(tolerance));
+  const TreePtr tree = tree_argument(gp, "gp");
+  const FirstHitsQuery query = query_argument(origins, directions, t_max, start, inside,
+                                              tree->leaves().size(), first_index, seed, threads);
+  TreeSurface surface(tree, {}, memory_argument(memory, "memory"), sampler_argument(sampler),
+                      tolerance_argument(tolerance));
   if (!query.inside.empty()) surface.serve_inside();
   FirstHits hits;
   {
@@ -222,20 +252,27 @@ py::dict first_hits_dict(const py::object& gp, const py::object& origins,
   }
   if (PyErr_Occurred()) throw py::error_already_set();
   const py::ssize_t n = query.rays.size();
-  Array t(n), position({n, py::ssize_t{3}}), gradient({n, py::ssize_t{3}}), value(n);
+  const auto leaves = static_cast<py::ssize_t>(surface.leaves().size());
+  const bool of_tree = leaves > 1;
+  Array t(n), position({n, py::ssize_t{3}}), gradient({n, py::ssize_t{3}});
+  Array value(of_tree ? std::vector{n, leaves} : std::vector{n});
+  Array slopes(of_tree ? std::vector{n, leaves, py::ssize_t{3}} : std::vector{n, py::ssize_t{3}});
   py::array_t<std::int32_t> part(n);
   for (py::ssize_t i = 0; i < n; ++i) {
     t.mutable_at(i) = hits.t[i];
-    value.mutable_at(i) = hits.state[i].value;
-    part.mutable_at(i) = std::isinf(hits.t[i]) ? -1 : 0;
-    const Vec3 p = std::isinf(hits.t[i]) ? hits.state[i].gradient : query.rays[i].at(hits.t[i]);
+    part.mutable_at(i) = hits.leaf[i];
+    const Vec3 p = std::isinf(hits.t[i]) ? hits.gradient[i] : query.rays[i].at(hits.t[i]);
     for (int k = 0; k < 3; ++k) {
       position.mutable_at(i, k) = p[k];
-      gradient.mutable_at(i, k) = hits.state[i].gradient[k];
+      gradient.mutable_at(i, k) = hits.gradient[i][k];
     }
   }
-  py::dict state("value"_a = value, "gradient"_a = gradient);
-  if (!hits.realisation.empty()) state["realisation"] = realisations_dict(hits.realisation);
+  for (py::ssize_t i = 0; i < n * leaves; ++i) {
+    value.mutable_data()[i] = hits.state[i].value;
+    for (int k = 0; k < 3; ++k) slopes.mutable_data()[3 * i + k] = hits.state[i].gradient[k];
+  }
+  py::dict state("value"_a = value, "gradient"_a = slopes);
+  if (!hits.realisation.empty()) state["realisation"] = realisations_dict(hits.realisation, leaves);
   return py::dict("t"_a = t, "position"_a = position, "gradient"_a = gradient, "part"_a = part,
                   "state"_a = state, "counters"_a = counters_dict(hits.counters));
 }
@@ -249,11 +286,11 @@ Array line_values_array(const py::object& gp, const py::object& origins,
   if (t.empty()) throw std::invalid_argument("t must hold at least one distance.");
   const double t_max = *std::max_element(t.begin(), t.end());
   if (!(t_max > 0)) throw std::invalid_argument("t must hold a distance above 0.");
-  const auto process = instance_argument<GaussianProcess>(gp, "gp", "a GaussianProcess");
-  const FirstHitsQuery query =
-      query_argument(origins, directions, t_max, start, inside, first_index, seed, threads);
-  ProcessSurface surface(process, {}, memory_argument(memory, "memory"), sampler_argument(sampler),
-                         tolerance_argument(tolerance));
+  const TreePtr tree = tree_argument(gp, "gp");
+  const FirstHitsQuery query = query_argument(origins, directions, t_max, start, inside,
+                                              tree->leaves().size(), first_index, seed, threads);
+  TreeSurface surface(tree, {}, memory_argument(memory, "memory"), sampler_argument(sampler),
+                      tolerance_argument(tolerance));
   if (!query.inside.empty()) surface.serve_inside();
   std::vector<double> values;
   {
@@ -261,7 +298,10 @@ Array line_values_array(const py::object& gp, const py::object& origins,
     values = line_values(surface, query, t);
   }
   if (PyErr_Occurred()) throw py::error_already_set();
-  Array out({static_cast<py::ssize_t>(query.rays.size()), static_cast<py::ssize_t>(t.size())});
+  std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(query.rays.size()),
+                                 static_cast<py::ssize_t>(t.size())};
+  if (surface.leaves().size() > 1) shape.push_back(surface.leaves().size());
+  Array out(shape);
   std::copy(values.begin(), values.end(), out.mutable_data());
   return out;
 }
@@ -352,7 +392,10 @@ void bind_process(py::module_& m) {
       "sampler"_a = "auto", "tolerance"_a = 1e-3, "seed"_a = 0, "threads"_a = 0,
       "First change of sign from outside to inside along rays: dict of t (N,) (inf = none), "
       "position (N, 3), gradient (N, 3),\n"
-      "part (N,) (-1 = none), state (the `start` of rays that leave the hits) and counters.\n\n"
+      "part (N,), the leaf that was hit (-1 = none), state (the `start` of rays that leave the "
+      "hits) and counters.\n\n"
+      "gp: a GaussianProcess or a CSG tree; the state of a tree is value (N, leaves) and gradient "
+      "(N, leaves, 3), NaN where a\nleaf was not sampled.\n"
       "origins, directions (N, 3), unit length. start: None (rays come from outside) or "
       "dict(value (N,), gradient (N, 3)):\n"
       "rays leave a point where f = value (0 on the surface), remembered as `memory` says "

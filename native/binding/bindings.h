@@ -13,6 +13,7 @@ void bind_vdb(pybind11::module_& m);
 void bind_kernel(pybind11::module_& m);
 void bind_process(pybind11::module_& m);
 void bind_realisation(pybind11::module_& m);
+void bind_tree(pybind11::module_& m);
 void bind_scene(pybind11::module_& m);
 void bind_film(pybind11::module_& m);
 void bind_render(pybind11::module_& m);

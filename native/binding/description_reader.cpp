@@ -221,9 +221,10 @@ ObjectDescription read_object(const py::handle& value, const std::string& path, 
     return o;
   }
   const py::object process = r.required("process");
-  if (!py::isinstance<GaussianProcess>(process))
-    refuse(r.path_of("process"), "takes a GaussianProcess, got " + shown(process));
-  o.process = py::cast<std::shared_ptr<GaussianProcess>>(process);
+  if (!py::isinstance<GaussianProcess>(process) && !py::isinstance<ProcessTree>(process))
+    refuse(r.path_of("process"),
+           "takes a GaussianProcess or a CSG tree of them, got " + shown(process));
+  o.process = tree_argument(process, r.path_of("process"));
   o.memory = memory_argument(r.text("memory", "renewal+"), r.path_of("memory"));
   o.sampler = static_cast<Sampler>(r.choice(
       "sampler", {"auto", "convolution", "markov", "spectral", "nystrom", "dense", "realisation"},

@@ -39,11 +39,19 @@ struct PathTracer::Impl {
         max_bounces(s.description().settings.max_bounces.value_or(kPathLengthLimit)),
         lines(scene.stochastic.size()),
         met(scene.stochastic.size()),
+        starts(scene.stochastic.size()),
         memory(scene.stochastic.size()),
         shadow_memory(scene.stochastic.size()),
-        realisations(scene.stochastic.size()) {}
+        realisations(scene.stochastic.size()) {
+    for (const auto& body : scene.bodies)
+      if (body.surface.leaves().size() > shadow_lines.size())
+        shadow_lines.resize(body.surface.leaves().size());
+  }
 
   PathSample trace(const Ray& camera_ray, double t_max);
+  TreeHit first_hit(const Scene::Impl::Body& body, Line* body_lines, const Ray& ray, double t_max,
+                    const PathMemory& remembered, std::vector<RealisationMemory>& kept,
+                    Rng& random);
   bool closest(const Ray& ray, double t_max, Vertex& v);
   void remember_others(const Vertex& v);
   Vec3 draw(const GradientLaw& law) {
@@ -66,9 +74,12 @@ struct PathTracer::Impl {
   // for it.
   std::vector<Line> lines;
   std::vector<char> met;
-  Line shadow_line;
+  std::vector<Line> shadow_lines;
+  std::vector<Start> starts;
+  TreeMarch march;
   PathMemory memory, shadow_memory;
-  std::vector<RealisationMemory> realisations;  // that the path sees, of memory `global`
+  // That the path sees, of memory `global`; a shadow ray sees a copy.
+  std::vector<RealisationMemory> realisations, shadow_realisations;
   const BlockPoints* points = nullptr;
   int bounce = 0;
   Rng* rng = nullptr;
@@ -79,7 +90,7 @@ struct PathTracer::Impl {
 PathTracer::PathTracer(const Scene& scene, const std::atomic<bool>* stop)
     : impl_(std::make_unique<Impl>(scene)) {
   for (Line& line : impl_->lines) line.stop_when(stop);
-  impl_->shadow_line.stop_when(stop);
+  for (Line& line : impl_->shadow_lines) line.stop_when(stop);
 }
 PathTracer::~PathTracer() = default;
 
@@ -150,6 +161,19 @@ PathSample PathTracer::Impl::trace(const Ray& camera_ray, double t_max) {
   return result;
 }
 
+TreeHit PathTracer::Impl::first_hit(const Scene::Impl::Body& body, Line* body_lines, const Ray& ray,
+                                    double t_max, const PathMemory& remembered,
+                                    std::vector<RealisationMemory>& kept, Rng& random) {
+  const std::size_t count = body.surface.leaves().size();
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::optional<State>& state = remembered[body.first + k];
+    starts[k] = body.surface.leaves()[k].start_from(state ? &*state : nullptr, false,
+                                                    &kept[body.first + k]);
+  }
+  return body.surface.first_hit(march, {body_lines, count}, ray, t_max, {starts.data(), count},
+                                random, *counters);
+}
+
 // The first surface along the ray: meshes bound the march through each process; the first of the
 // first hits wins (union of independent processes, definitions B5).
 bool PathTracer::Impl::closest(const Ray& ray, double t_max, Vertex& v) {
@@ -157,17 +181,16 @@ bool PathTracer::Impl::closest(const Ray& ray, double t_max, Vertex& v) {
   double nearest = t_max;
   const bool hit_mesh = scene.triangles && scene.triangles->intersect(ray, t_max, mesh, *counters);
   if (hit_mesh) nearest = mesh.t;
-  for (std::size_t i = 0; i < scene.stochastic.size(); ++i) {
-    const ProcessSurface& surface = scene.stochastic[i].surface;
-    const auto [enter, leave] = clip(surface.bounds(), ray.origin, ray.direction, 0, nearest);
-    met[i] = enter <= leave;
-    if (!met[i]) continue;
-    const Start start =
-        surface.start_from(memory[i] ? &*memory[i] : nullptr, false, &realisations[i]);
-    const double t = surface.first_hit(lines[i], ray, nearest, start, *rng, *counters);
-    if (t >= nearest) continue;
-    nearest = t;
-    v.surface = static_cast<int>(i);
+  for (const auto& body : scene.bodies) {
+    const auto [enter, leave] = clip(body.surface.bounds(), ray.origin, ray.direction, 0, nearest);
+    const bool meets = enter <= leave;
+    for (std::size_t k = 0; k < body.surface.leaves().size(); ++k) met[body.first + k] = meets;
+    if (!meets) continue;
+    const TreeHit hit =
+        first_hit(body, &lines[body.first], ray, nearest, memory, realisations, *rng);
+    if (hit.t >= nearest) continue;
+    nearest = hit.t;
+    v.surface = static_cast<int>(body.first) + hit.leaf;
   }
   if (v.surface >= 0) {
     v.t = nearest;
@@ -186,23 +209,35 @@ bool PathTracer::Impl::closest(const Ray& ray, double t_max, Vertex& v) {
   return true;
 }
 
-// Keeps the state of every process that was sampled at the vertex, save the one that was hit
+// Keeps the state of every leaf that was sampled at the vertex, save the one that was hit
 // (definitions B1); all else is forgotten.
 void PathTracer::Impl::remember_others(const Vertex& v) {
-  for (std::size_t i = 0; i < lines.size(); ++i) {
-    memory[i].reset();
-    const ProcessSurface& surface = scene.stochastic[i].surface;
-    if (!met[i] || static_cast<int>(i) == v.surface || surface.memory() == Memory::none) continue;
-    if (!surface.sampled_at(lines[i], v.t)) continue;
-    const double value = surface.value(lines[i], v.t, *rng);
-    if (!(value > 0)) {
-      ++counters->states_inside;
-      continue;
+  for (const auto& body : scene.bodies) {
+    const ProcessTree& tree = body.surface.tree();
+    bool hit = false;
+    for (std::size_t k = 0; k < tree.leaves().size(); ++k) {
+      const std::size_t i = body.first + k;
+      memory[i].reset();
+      const ProcessSurface& surface = scene.stochastic[i].surface;
+      if (static_cast<int>(i) == v.surface) hit = true;
+      if (!met[i] || static_cast<int>(i) == v.surface || surface.memory() == Memory::none) continue;
+      if (surface.sampled_at(lines[i], v.t))
+        memory[i] = surface.state(surface.value(lines[i], v.t, *rng), {});
     }
-    const Vec3 gradient = surface.memory() != Memory::renewal
-                              ? draw(surface.gradient_law(lines[i], v.t, *rng))
-                              : Vec3{};
-    memory[i] = surface.state(value, gradient);
+    const int sign = tree.sign(tree.root(), [&](int k) {
+      const std::optional<State>& state = memory[body.first + k];
+      return !state ? 0 : state->value * tree.leaves()[k].sign > 0 ? 1 : -1;
+    });
+    const bool inside = !hit && sign < 0;
+    if (inside) ++counters->states_inside;
+    for (std::size_t k = 0; k < tree.leaves().size(); ++k) {
+      const std::size_t i = body.first + k;
+      if (inside) memory[i].reset();
+      const ProcessSurface& surface = scene.stochastic[i].surface;
+      if (memory[i] && surface.memory() != Memory::renewal)
+        memory[i] =
+            surface.state(memory[i]->value, draw(surface.gradient_law(lines[i], v.t, *rng)));
+    }
   }
 }
 
@@ -210,14 +245,13 @@ void PathTracer::Impl::remember_others(const Vertex& v) {
 bool PathTracer::Impl::visible(const Ray& ray, double distance) {
   ++counters->shadow_rays;
   if (scene.triangles && scene.triangles->occluded(ray, distance, *counters)) return false;
-  for (std::size_t i = 0; i < scene.stochastic.size(); ++i) {
-    const ProcessSurface& surface = scene.stochastic[i].surface;
-    const auto [enter, leave] = clip(surface.bounds(), ray.origin, ray.direction, 0, distance);
+  shadow_realisations = realisations;
+  for (const auto& body : scene.bodies) {
+    const auto [enter, leave] = clip(body.surface.bounds(), ray.origin, ray.direction, 0, distance);
     if (enter > leave) continue;
-    RealisationMemory realisation = realisations[i];
-    const Start start =
-        surface.start_from(shadow_memory[i] ? &*shadow_memory[i] : nullptr, false, &realisation);
-    if (surface.first_hit(shadow_line, ray, distance, start, light_rng, *counters) < distance)
+    if (first_hit(body, shadow_lines.data(), ray, distance, shadow_memory, shadow_realisations,
+                  light_rng)
+            .t < distance)
       return false;
   }
   return true;
@@ -257,19 +291,22 @@ std::optional<ScatterSample> PathTracer::Impl::scatter_at(const Ray& ray, const 
   }
 
   const ProcessSurface& surface = scene.stochastic[v.surface].surface;
-  const GradientLaw law = surface.gradient_law(lines[v.surface], v.t, *rng);
+  // Of the object: a subtracted leaf is left where it grows.
+  const double sign = scene.stochastic[v.surface].sign;
+  GradientLaw law = surface.gradient_law(lines[v.surface], v.t, *rng);
+  law.mean = law.mean * sign;
   Vec3 gradient = law.mean;
   if (!law.degenerate) {
     const auto [xi1, xi2] = square_to_normals(point(kGradientDecision, *rng));
     gradient += law.b1 * xi1 + law.b2 * xi2;
     counters->line_normals += 2;
   }
-  memory[v.surface] = surface.state(0, gradient);
+  memory[v.surface] = surface.state(0, gradient * sign);
   normal = normalize(gradient);
   if (v.material->specular() && !law.degenerate) {
     const MirrorScatter scatter(*v.material, ray.direction, law);
     direct = sample_lights(v, scatter, [&](const Vec3& w, PathMemory& m) {
-      m[v.surface] = surface.state(0, *scatter.gradient_for(w));
+      m[v.surface] = surface.state(0, *scatter.gradient_for(w) * sign);
     });
     return scatter.sample(gradient);
   }

@@ -11,37 +11,48 @@
 namespace gpis {
 namespace {
 
-// Calls visit(row, line, t, rng, counters) for every ray, in parallel.
+// Calls visit(row, lines, hit, rng, counters) for every ray, in parallel.
 template <class Visit>
-Counters for_each_hit(const ProcessSurface& surface, const FirstHitsQuery& query,
+Counters for_each_hit(const TreeSurface& surface, const FirstHitsQuery& query,
                       std::vector<RealisationMemory>& realisations, Visit visit) {
   struct Worker {
-    Line line;
+    std::vector<Line> lines;
+    std::vector<Start> starts;
+    TreeMarch march;
     Counters counters;
   };
   tbb::enumerable_thread_specific<Worker> workers;
   tbb::task_arena arena(query.threads > 0 ? query.threads : tbb::task_arena::automatic);
   std::atomic<bool> stop = false;
+  const std::size_t leaves = surface.leaves().size();
+  const auto trace = [&](std::size_t i, Worker& worker) {
+    Rng rng(query.seed, query.first_index + i);
+    std::vector<RealisationMemory> fresh;
+    RealisationMemory* kept = nullptr;
+    if (surface.memory() == Memory::global) {
+      if (realisations.empty()) fresh.resize(leaves);
+      kept = realisations.empty() ? fresh.data() : &realisations[i * leaves];
+      for (std::size_t k = 0; k < leaves && query.realisation.empty(); ++k) kept[k].seed = rng();
+    }
+    const bool inside = !query.inside.empty() && query.inside[i];
+    for (std::size_t k = 0; k < leaves; ++k) {
+      const State* state = query.start.empty() ? nullptr : &query.start[i * leaves + k];
+      if (state && std::isnan(state->value)) state = nullptr;
+      worker.starts[k] = surface.leaves()[k].start_from(state, inside, kept ? kept + k : nullptr);
+    }
+    const TreeHit hit = surface.first_hit(worker.march, worker.lines, query.rays[i], query.t_max,
+                                          worker.starts, rng, worker.counters);
+    visit(i, worker.lines, hit, rng, worker.counters);
+  };
   const auto all = [&] {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, query.rays.size(), 256),
                       [&](const auto& range) {
                         Worker& worker = workers.local();
-                        worker.line.stop_when(&stop);
-                        for (std::size_t i = range.begin(); i != range.end() && !stop; ++i) {
-                          Rng rng(query.seed, query.first_index + i);
-                          RealisationMemory fresh;
-                          RealisationMemory* realisation = nullptr;
-                          if (surface.memory() == Memory::global) {
-                            realisation = realisations.empty() ? &fresh : &realisations[i];
-                            if (query.realisation.empty()) realisation->seed = rng();
-                          }
-                          const bool inside = !query.inside.empty() && query.inside[i];
-                          const Start start = surface.start_from(
-                              query.start.empty() ? nullptr : &query.start[i], inside, realisation);
-                          const double t = surface.first_hit(
-                              worker.line, query.rays[i], query.t_max, start, rng, worker.counters);
-                          visit(i, worker.line, t, rng, worker.counters);
-                        }
+                        worker.lines.resize(leaves);
+                        worker.starts.resize(leaves);
+                        for (Line& line : worker.lines) line.stop_when(&stop);
+                        for (std::size_t i = range.begin(); i != range.end() && !stop; ++i)
+                          trace(i, worker);
                       });
   };
   // The calling thread only waits, so that it can be asked to stop.
@@ -56,37 +67,50 @@ Counters for_each_hit(const ProcessSurface& surface, const FirstHitsQuery& query
 
 }  // namespace
 
-FirstHits first_hits(const ProcessSurface& surface, const FirstHitsQuery& query) {
+FirstHits first_hits(const TreeSurface& surface, const FirstHitsQuery& query) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::size_t rays = query.rays.size(), leaves = surface.leaves().size();
   FirstHits result;
-  result.t.resize(query.rays.size());
-  result.state.resize(query.rays.size());
+  result.t.resize(rays);
+  result.leaf.resize(rays);
+  result.gradient.assign(rays, {nan, nan, nan});
+  result.state.assign(rays * leaves, {nan, {nan, nan, nan}});
   result.realisation = query.realisation;
-  if (surface.memory() == Memory::global) result.realisation.resize(query.rays.size());
-  result.counters = for_each_hit(
-      surface, query, result.realisation,
-      [&](std::size_t i, Line& line, double t, Rng& rng, Counters& counters) {
-        result.t[i] = t;
-        if (std::isinf(t)) {
-          result.state[i] = {nan, {nan, nan, nan}};
-          return;
-        }
-        counters.line_normals += 2;
-        result.state[i] = surface.state(0, surface.gradient_law(line, t, rng).draw(rng));
-      });
+  if (surface.memory() == Memory::global) result.realisation.resize(rays * leaves);
+  result.counters =
+      for_each_hit(surface, query, result.realisation,
+                   [&](std::size_t i, std::vector<Line>& lines, const TreeHit& hit, Rng& rng,
+                       Counters& counters) {
+                     result.t[i] = hit.t;
+                     result.leaf[i] = hit.leaf;
+                     if (hit.leaf < 0) return;
+                     for (std::size_t k = 0; k < leaves; ++k) {
+                       const ProcessSurface& leaf = surface.leaves()[k];
+                       if (!leaf.sampled_at(lines[k], hit.t)) continue;
+                       const bool winner = static_cast<int>(k) == hit.leaf;
+                       const double value = winner ? 0 : leaf.value(lines[k], hit.t, rng);
+                       counters.line_normals += 2;
+                       const Vec3 gradient = leaf.gradient_law(lines[k], hit.t, rng).draw(rng);
+                       result.state[i * leaves + k] = leaf.state(value, gradient);
+                       if (winner) result.gradient[i] = gradient * surface.sign(hit.leaf);
+                     }
+                   });
   return result;
 }
 
-std::vector<double> line_values(const ProcessSurface& surface, const FirstHitsQuery& query,
+std::vector<double> line_values(const TreeSurface& surface, const FirstHitsQuery& query,
                                 const std::vector<double>& t) {
-  std::vector<double> values(query.rays.size() * t.size(),
+  const std::size_t leaves = surface.leaves().size();
+  std::vector<double> values(query.rays.size() * t.size() * leaves,
                              std::numeric_limits<double>::quiet_NaN());
   std::vector<RealisationMemory> realisations = query.realisation;
   for_each_hit(surface, query, realisations,
-               [&](std::size_t i, Line& line, double, Rng& rng, Counters&) {
+               [&](std::size_t i, std::vector<Line>& lines, const TreeHit&, Rng& rng, Counters&) {
                  for (std::size_t j = 0; j < t.size(); ++j)
-                   if (surface.sampled_at(line, t[j]))
-                     values[i * t.size() + j] = surface.value(line, t[j], rng);
+                   for (std::size_t k = 0; k < leaves; ++k)
+                     if (surface.leaves()[k].sampled_at(lines[k], t[j]))
+                       values[(i * t.size() + j) * leaves + k] =
+                           surface.leaves()[k].value(lines[k], t[j], rng);
                });
   return values;
 }

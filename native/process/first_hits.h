@@ -8,16 +8,18 @@
 
 #include "core/counters.h"
 #include "process/realisation_memory.h"
-#include "process/surface.h"
+#include "process/tree_surface.h"
 
 namespace gpis {
 
 struct FirstHitsQuery {
   std::vector<Ray> rays;
   double t_max = kInfinity;
-  std::vector<State>
-      start;  // one a ray: rays that leave a surface point; empty: rays that come from outside
-  std::vector<RealisationMemory> realisation;  // one a row, of memory `global`; empty: fresh ones
+  // Rays that leave a surface point: one a ray and leaf, ray after ray, value NaN where nothing is
+  // remembered. Empty: rays that come from outside.
+  std::vector<State> start;
+  // One a ray and leaf, of memory `global`; empty: fresh ones.
+  std::vector<RealisationMemory> realisation;
   std::vector<char> inside;  // one a ray: those that travel inside the body; empty: none
   std::uint64_t seed = 0, first_index = 0;  // row i uses the random stream (seed, first_index + i)
   int threads = 0;                          // 0 = all cores
@@ -26,17 +28,21 @@ struct FirstHitsQuery {
 };
 
 struct FirstHits {
-  std::vector<double> t;     // infinity where there is none
-  std::vector<State> state;  // value 0 and a gradient drawn from its law; NaN where there is no hit
-  std::vector<RealisationMemory> realisation;  // that each row has seen; memory `global` alone
+  std::vector<double> t;       // infinity where there is none
+  std::vector<int> leaf;       // that was hit, -1 where there is no hit
+  std::vector<Vec3> gradient;  // of the tree, drawn from its law; NaN where there is no hit
+  // One a ray and leaf: value 0 at the leaf that was hit, NaN where the leaf was not sampled.
+  std::vector<State> state;
+  std::vector<RealisationMemory> realisation;  // that each has seen; memory `global` alone
   Counters counters;
 };
 
-FirstHits first_hits(const ProcessSurface& surface, const FirstHitsQuery& query);
+FirstHits first_hits(const TreeSurface& surface, const FirstHitsQuery& query);
 
-// Values of f at `t` along every ray, row after row, on the sample paths that first_hits draws; NaN
-// where the path was not sampled (behind the hit, or where the surface is certainly absent).
-std::vector<double> line_values(const ProcessSurface& surface, const FirstHitsQuery& query,
+// Values of f at `t` along every ray, row after row (t after t and leaf after leaf), on the sample
+// paths that first_hits draws; NaN where the path was not sampled (behind the hit, or where the
+// surface is certainly absent).
+std::vector<double> line_values(const TreeSurface& surface, const FirstHitsQuery& query,
                                 const std::vector<double>& t);
 
 }  // namespace gpis

@@ -29,6 +29,9 @@ struct Line::Impl {
   double hit_t = kInfinity, hit_g = 0, hit_dg = 0;
   FieldSample hit_mean, hit_sigma;
 
+  // A leaf of a tree that sees the g of another leaf: that one's line holds the path.
+  Impl* shared = nullptr;
+
   // The one instance of each kind of path, made when first used: a line serves objects of every
   // kind.
   template <class Path>

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "process/line_impl.h"
+#include "process/line_noise.h"
 
 namespace gpis {
 
@@ -19,6 +20,8 @@ class LineSampler {
   virtual void path_at(Line::Impl& line, double t, Rng& rng, double& g, double& dg) const = 0;
   virtual PathGradient gradient(Line::Impl& line, double t, double g, double dg,
                                 Rng& rng) const = 0;
+  // The path of a leaf of a tree, which marches all of its leaves itself.
+  virtual std::unique_ptr<LineNoise> noise(Line::Impl& line) const = 0;
   // Bound on |implied - exact correlation| of the path.
   virtual double correlation_error() const = 0;
 };

@@ -34,6 +34,10 @@ class MarchSampler final : public LineSampler {
     return line.path<Path>().gradient(t, g, dg, rng);
   }
 
+  std::unique_ptr<LineNoise> noise(Line::Impl& line) const override {
+    return std::make_unique<PathNoise<Path>>(line.path<Path>(), plan_);
+  }
+
   double correlation_error() const override { return plan_.correlation_error; }
 
  private:

@@ -77,6 +77,9 @@ class OrnsteinUhlenbeck final : public LineSampler {
     const double nan = std::numeric_limits<double>::quiet_NaN();
     return {{nan, nan, nan}, {}, {}, 0};
   }
+  std::unique_ptr<LineNoise> noise(Line::Impl&) const override {
+    refuse("Matern 1/2 has no slope: no tree can march it.");
+  }
   double correlation_error() const override { return 1e-14; }
 
  private:

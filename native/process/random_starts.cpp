@@ -1,5 +1,5 @@
-// Random starts of a line: the truncated normal and the flux-weighted normal (formulas C5, C6).
-// Both are exact for every a.
+// Random starts of a line: truncated normals and the flux-weighted normal (formulas C5, C6), exact
+// however far out they lie.
 #include <cmath>
 
 #include "process/surface.h"
@@ -17,6 +17,26 @@ double truncated_normal(double a, Rng& rng) {
     const double z = std::sqrt(a * a - 2 * std::log(rng.positive_uniform()));
     if (rng.positive_uniform() * z < a) return std::max(z, std::nextafter(a, kInfinity));
   }
+}
+
+double truncated_normal(double low, double high, Rng& rng) {
+  if (high == kInfinity) return truncated_normal(low, rng);
+  if (low < 0 && high <= -low) return -truncated_normal(-high, -low, rng);
+  // Now the interval lies right of 0, or reaches further to the right: it falls off by e^{-1} or
+  // less (uniform proposals), or holds most of the tail above `low` (acceptance > .6).
+  const double width = high - low, nearest = std::max(low, 0.0);
+  const bool flat = std::max(high, -low) * std::max(high, -low) - nearest * nearest < 2;
+  for (;;) {
+    const double z = flat ? low + width * rng.uniform() : truncated_normal(low, rng);
+    if (!(z > low && z < high)) continue;
+    if (!flat || rng.uniform() < std::exp(0.5 * (nearest - z) * (nearest + z))) return z;
+  }
+}
+
+double log_normal_tail(double a) {
+  if (a < 30) return std::log(0.5 * std::erfc(a / std::sqrt(2)));
+  const double r = 1 / (a * a);  // asymptotic series, 1e-7 at 30
+  return -0.5 * a * a - std::log(a * std::sqrt(2 * kPi)) + std::log1p(-r * (1 - 3 * r));
 }
 
 double flux_weighted_normal(double a, Rng& rng) {

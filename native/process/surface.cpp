@@ -69,6 +69,7 @@ double ProcessSurface::first_hit(Line& line, const Ray& ray, double t_max, const
   l.hit_t = kInfinity;
   l.inside = start.inside;
   l.plan = start.inside ? planned_inside_.get() : planned_.get();
+  l.shared = nullptr;
   const auto& [origin, direction] =
       l.geometry = {world_to_object_.point(ray.origin), world_to_object_.vector(ray.direction)};
   auto [t_begin, t_end] = clip(planned_->bounds, origin, direction, 0, t_max);
@@ -86,8 +87,21 @@ double ProcessSurface::first_hit(Line& line, const Ray& ray, double t_max, const
   return t;
 }
 
+namespace {
+
+// Where a line has its path: a leaf of a tree may see another leaf's.
+struct PathOf {
+  explicit PathOf(Line::Impl& l)
+      : line(l.shared ? *l.shared : l), sampler(*line.plan->line_sampler) {}
+  Line::Impl& line;
+  const LineSampler& sampler;
+};
+
+}  // namespace
+
 bool ProcessSurface::sampled_at(const Line& line, double t) const {
-  for (const auto& s : line.impl().stretches)
+  const Line::Impl& l = line.impl();
+  for (const auto& s : (l.shared ? *l.shared : l).stretches)
     if (s.begin <= t && t <= s.end) return true;
   return false;
 }
@@ -96,7 +110,8 @@ double ProcessSurface::value(Line& line, double t, Rng& rng) const {
   Line::Impl& l = line.impl();
   if (t == l.hit_t) return 0;
   double g, dg;
-  l.plan->line_sampler->path_at(l, t, rng, g, dg);
+  const PathOf path(l);
+  path.sampler.path_at(path.line, t, rng, g, dg);
   const Vec3 p = l.geometry.origin + l.geometry.direction * t;
   const double f = l.plan->process->mean->value(p) + l.plan->process->sigma->value(p) * g;
   return l.inside ? -f : f;
@@ -104,6 +119,7 @@ double ProcessSurface::value(Line& line, double t, Rng& rng) const {
 
 GradientLaw ProcessSurface::gradient_law(Line& line, double t, Rng& rng) const {
   Line::Impl& l = line.impl();
+  const PathOf path_of(l);
   FieldSample mean, sigma;
   double g, dg;
   if (t == l.hit_t) {
@@ -115,10 +131,10 @@ GradientLaw ProcessSurface::gradient_law(Line& line, double t, Rng& rng) const {
     const Vec3 p = l.geometry.origin + l.geometry.direction * t;
     mean = l.plan->process->mean->sample(p);
     sigma = l.plan->process->sigma->sample(p);
-    l.plan->line_sampler->path_at(l, t, rng, g, dg);
+    path_of.sampler.path_at(path_of.line, t, rng, g, dg);
   }
   // ∇f = ∇μ + g∇σ + σ∇g (math.md §2).
-  const PathGradient path = l.plan->line_sampler->gradient(l, t, g, dg, rng);
+  const PathGradient path = path_of.sampler.gradient(path_of.line, t, g, dg, rng);
   const Mat3 to_world = transpose(world_to_object_.linear);
   GradientLaw law;
   law.mean = to_world * (mean.gradient + sigma.gradient * g + path.mean * sigma.value);

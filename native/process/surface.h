@@ -85,6 +85,8 @@ class ProcessSurface {
   void serve_inside();
 
   Memory memory() const { return memory_; }
+  const PlannedLine& planned() const { return *planned_; }
+  const Affine& world_to_object() const { return world_to_object_; }
   // World-space box outside of which there is certainly no surface (infinite where unbounded).
   const Box3& bounds() const { return world_bounds_; }
 
@@ -125,9 +127,11 @@ class ProcessSurface {
   std::shared_ptr<const PlannedLine> planned_, planned_inside_;
 };
 
-// Random starts (also used by tests): N(0,1) truncated to (a, ∞), and the flux-weighted normal z ~
-// z₊ N(z; a, 1) (formulas C5, C6).
+// Random starts (also used by tests): N(0,1) truncated to (a, ∞) and to (low, high), the logarithm
+// of its mass above a, and the flux-weighted normal z ~ z₊ N(z; a, 1) (formulas C5, C6).
 double truncated_normal(double a, Rng& rng);
+double truncated_normal(double low, double high, Rng& rng);
+double log_normal_tail(double a);
 double flux_weighted_normal(double a, Rng& rng);
 
 }  // namespace gpis

@@ -152,8 +152,10 @@ void check_object(const SceneDescription& d, const ObjectDescription& o, const E
       fail(path + ".materials", " names a material that is not in `materials`.");
   if (o.type == ObjectDescription::Type::gpis) {
     if (!o.process) fail(path + ".process", " is missing; a gpis object needs one.");
-    if (o.materials.size() != 1)
-      fail(path + ".materials", " has ", o.materials.size(), " entries; a gpis object takes one.");
+    const std::size_t leaves = o.process->leaves().size();
+    if (o.materials.size() != 1 && o.materials.size() != leaves)
+      fail(path + ".materials", " has ", o.materials.size(), " entries; a gpis object takes one",
+           leaves > 1 ? ", or one for each of its " + std::to_string(leaves) + " operands." : ".");
     return;
   }
   if (o.mesh < 0 || o.mesh >= static_cast<int>(d.meshes.size()))

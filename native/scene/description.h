@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/vec.h"
-#include "process/gaussian_process.h"
+#include "process/tree.h"
 
 namespace gpis {
 
@@ -83,7 +83,7 @@ struct ObjectDescription {
   int mesh = -1;  // index into meshes
   Affine matrix;
   std::vector<int> materials;  // indices into materials
-  std::shared_ptr<const GaussianProcess> process;
+  TreePtr process;
   Memory memory = Memory::renewal_plus;
   Sampler sampler = Sampler::automatic;
 };

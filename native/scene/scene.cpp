@@ -62,7 +62,7 @@ double bounding_radius(const Scene::Impl& scene) {
     all.include(b.max);
   };
   if (scene.triangles) include(scene.triangles->bounds());
-  for (const auto& s : scene.stochastic) include(s.surface.bounds());
+  for (const auto& b : scene.bodies) include(b.surface.bounds());
   const double radius = all.empty() ? 0 : length(all.max - all.min) / 2;
   return radius > 0 ? radius : 1;
 }
@@ -92,17 +92,23 @@ void Scene::build_objects() {
     const ObjectDescription& o = d.objects[i];
     if (o.type == ObjectDescription::Type::gpis) {
       try {
-        if (!o.process->kernel->differentiable())
-          throw std::invalid_argument("The kernel " + o.process->kernel->describe() +
-                                      " has no gradient, so no normals and no light: take Matern "
-                                      "3/2 for a rough surface.");
-        impl_->stochastic.push_back(
-            {static_cast<int>(i),
-             ProcessSurface(o.process, o.matrix, o.memory, o.sampler, d.settings.missed_root),
-             impl_->materials[o.materials[0]].get()});
+        for (const auto& leaf : o.process->leaves())
+          if (!leaf.process->kernel->differentiable())
+            throw std::invalid_argument("The kernel " + leaf.process->kernel->describe() +
+                                        " has no gradient, so no normals and no light: take "
+                                        "Matern 3/2 for a rough surface.");
+        impl_->bodies.push_back(
+            {static_cast<int>(i), impl_->stochastic.size(),
+             TreeSurface(o.process, o.matrix, o.memory, o.sampler, d.settings.missed_root)});
       } catch (const std::invalid_argument& error) {
         throw std::invalid_argument(EntryPath("objects", i, o.name) + ".process" + ": " +
                                     error.what());
+      }
+      const TreeSurface& surface = impl_->bodies.back().surface;
+      for (std::size_t k = 0; k < surface.leaves().size(); ++k) {
+        const int material = o.materials[o.materials.size() == 1 ? 0 : k];
+        impl_->stochastic.push_back({surface.leaves()[k], impl_->materials[material].get(),
+                                     surface.sign(static_cast<int>(k))});
       }
       continue;
     }
@@ -158,9 +164,9 @@ std::vector<std::pair<std::string, std::string>> Scene::plan() const {
                                             (smooth ? ", roughness raised to .01" : "");
     if (!row.empty()) rows.emplace_back("materials[" + std::to_string(i) + "].model", row);
   }
-  for (const auto& s : impl_->stochastic)
-    for (const auto& [key, value] : s.surface.plan())
-      rows.emplace_back(EntryPath("objects", s.object, d.objects[s.object].name) + ("." + key),
+  for (const auto& b : impl_->bodies)
+    for (const auto& [key, value] : b.surface.plan())
+      rows.emplace_back(EntryPath("objects", b.object, d.objects[b.object].name) + ("." + key),
                         value);
   return rows;
 }

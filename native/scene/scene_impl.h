@@ -4,16 +4,22 @@
 #include "geometry/triangle_scene.h"
 #include "light/light_set.h"
 #include "material/material.h"
-#include "process/surface.h"
+#include "process/tree_surface.h"
 #include "scene/scene.h"
 
 namespace gpis {
 
 struct Scene::Impl {
+  // A leaf of a stochastic object's tree.
   struct Stochastic {
-    int object;  // index into the description's objects
     ProcessSurface surface;
     const Material* material;
+    double sign;  // gradients of the object are those of the leaf times this
+  };
+  struct Body {
+    int object;         // index into the description's objects
+    std::size_t first;  // its leaves are stochastic[first], …
+    TreeSurface surface;
   };
 
   std::vector<std::unique_ptr<Material>> materials;
@@ -21,6 +27,7 @@ struct Scene::Impl {
   std::vector<std::vector<const Material*>>
       instance_materials;  // by instance of `triangles`, then material_index
   std::vector<Stochastic> stochastic;
+  std::vector<Body> bodies;
   LightSet lights;
   double radius = 1;  // of the scene's bounding sphere
 };

@@ -104,7 +104,7 @@ inline void add_process(SceneDescription& scene, std::shared_ptr<const GaussianP
                         int material, Memory memory, const Affine& matrix = {}) {
   ObjectDescription o;
   o.type = ObjectDescription::Type::gpis;
-  o.process = std::move(process);
+  o.process = ProcessTree::single(std::move(process));
   o.materials = {material};
   o.memory = memory;
   o.matrix = matrix;

@@ -334,7 +334,7 @@ def test_streams_depend_on_the_row_alone(seed):
         (lambda: gn.SquaredExponential("x"), "length_scale must be a number or three numbers, it is 'x'"),
         (lambda: gn.SquaredExponential(1, rotation="x"), "rotation must be a quaternion"),
         (lambda: gn.SquaredExponential(1).derivative_variance([1, np.nan, 0]), "direction must hold finite numbers"),
-        (lambda: gn.first_hits(None, [[0, 0, 0]], [[1, 0, 0]], 1), "gp must be a GaussianProcess, it is a NoneType"),
+        (lambda: gn.first_hits(None, [[0, 0, 0]], [[1, 0, 0]], 1), "gp must be a GaussianProcess or a CSG tree of them"),
         (lambda: gn.line_values(None, [[0, 0, 0]], [[1, 0, 0]], [1]), "gp must be a GaussianProcess"),
         (lambda: gn.first_hits(standard(), [[0, 0, 0]], [[1, 0, 0]], 1, threads=10**6), "it is 1000000"),
         (lambda: gn.first_hits(standard(), [[0, 0, 0]], [[1, 0, 0]], 1, start={1: 2}), "unknown key '1'"),

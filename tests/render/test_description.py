@@ -164,7 +164,7 @@ WRONG = [
     ("objects.3.materials", ["wood", "gold"], "objects[3].materials"),
     ("objects.3.memory", "eternal", "objects[3].memory"),
     ("objects.3.sampler", "magic", "objects[3].sampler: takes auto, convolution, markov, spectral, nystrom, dense"),
-    ("objects.3.process", {"mean": 1}, "objects[3].process: takes a GaussianProcess, got a value of type dict"),
+    ("objects.3.process", {"mean": 1}, "objects[3].process: takes a GaussianProcess or a CSG tree of them, got"),
     # What the format has and this version does not
     ("camera.lens", {"radius": 0.1}, "camera.lens: depth of field is not supported"),
     ("materials.wood.type", "dielectric", "materials['wood'].type: 'dielectric' is not supported by this version"),

@@ -1,0 +1,90 @@
+#include "process/tree_surface.h"
+
+#include <stdexcept>
+
+#include "process/realisation_path.h"
+
+namespace gpis {
+namespace {
+
+constexpr Box3 kEverywhere{{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
+
+Box3 box_of(const ProcessTree& tree, int node, const std::vector<ProcessSurface>& leaves) {
+  const ProcessTree::Node& n = tree.nodes()[node];
+  // Outside of its bounds a leaf is absent: its complement is everywhere.
+  if (n.kind == ProcessTree::Kind::leaf)
+    return tree.leaves()[n.leaf].sign > 0 ? leaves[n.leaf].bounds() : kEverywhere;
+  const bool all = n.kind == ProcessTree::Kind::least;
+  Box3 box = all ? Box3{} : kEverywhere;
+  for (const int child : n.children) {
+    const Box3 b = box_of(tree, child, leaves);
+    for (int i = 0; i < 3; ++i) {
+      box.min[i] = all ? std::min(box.min[i], b.min[i]) : std::max(box.min[i], b.min[i]);
+      box.max[i] = all ? std::max(box.max[i], b.max[i]) : std::min(box.max[i], b.max[i]);
+    }
+  }
+  return box;
+}
+
+}  // namespace
+
+TreeSurface::TreeSurface(TreePtr tree, const Affine& object_to_world, Memory memory,
+                         Sampler sampler, double missed_root)
+    : tree_(std::move(tree)), inside_out_(ProcessTree::complement(*tree_)) {
+  const auto& leaves = tree_->leaves();
+  for (std::size_t i = 0; i < leaves.size(); ++i) {
+    try {
+      if (!tree_->is_single() && !leaves[i].process->kernel->differentiable())
+        throw std::invalid_argument("the kernel " + leaves[i].process->kernel->describe() +
+                                    " has no gradient, and trees are marched by gradients: take "
+                                    "Matern 3/2 for a rough surface.");
+      leaves_.emplace_back(leaves[i].process, object_to_world, memory, sampler, missed_root);
+    } catch (const std::invalid_argument& error) {
+      if (leaves.size() == 1) throw;
+      throw std::invalid_argument("Operand " + std::to_string(i) + ": " + error.what());
+    }
+  }
+  for (const ProcessSurface& leaf : leaves_) plans_.push_back(&leaf.planned());
+  bounds_ = box_of(*tree_, tree_->root(), leaves_);
+}
+
+void TreeSurface::serve_inside() {
+  if (tree_->is_single()) leaves_[0].serve_inside();
+}
+
+TreeHit TreeSurface::first_hit(TreeMarch& march, std::span<Line> lines, const Ray& ray,
+                               double t_max, std::span<const Start> starts, Rng& rng,
+                               Counters& counters) const {
+  if (tree_->is_single()) {
+    const double t = leaves_[0].first_hit(lines[0], ray, t_max, starts[0], rng, counters);
+    return {t, t < kInfinity ? 0 : -1};
+  }
+  const Affine& to_object = leaves_[0].world_to_object();
+  const LineGeometry geometry{to_object.point(ray.origin), to_object.vector(ray.direction)};
+  // Leaves are drawn as they are: a ray inside sees their tree inside out (definitions B7).
+  const ProcessTree& tree = starts[0].inside ? *inside_out_ : *tree_;
+  const bool kept = memory() == Memory::global;
+  const auto keep = [&](bool now) {
+    for (std::size_t k = 0; k < lines.size() && kept; ++k)
+      lines[k].impl().path<RealisationPath>().keep(now ? starts[k].realisation : nullptr);
+  };
+  keep(true);
+  const TreeHit hit =
+      march.first_hit(tree, plans_, geometry, lines, t_max, starts, kept, rng, counters);
+  keep(false);
+  return hit;
+}
+
+std::vector<std::pair<std::string, std::string>> TreeSurface::plan() const {
+  if (leaves_.size() == 1 && tree_->is_single()) return leaves_[0].plan();
+  std::vector<std::pair<std::string, std::string>> rows;
+  const bool shared = tree_->noises() < static_cast<int>(leaves_.size());
+  rows.emplace_back("composition", tree_->describe() + ", composed per realisation; noise " +
+                                       (shared ? "shared by some leaves" : "independent"));
+  for (std::size_t i = 0; i < leaves_.size(); ++i)
+    for (const auto& [key, text] : leaves_[i].plan())
+      rows.emplace_back("leaf[" + std::to_string(i) + "]." + key, text);
+  return rows;
+}
+
+}  // namespace gpis

@@ -1,0 +1,43 @@
+// A tree of processes placed in the world and planned for rendering: its leaves are ProcessSurfaces
+// that share one place, one memory model and one march. A tree of one leaf is that leaf and keeps
+// the march of its own.
+#pragma once
+
+#include "process/surface.h"
+#include "process/tree_march.h"
+
+namespace gpis {
+
+class TreeSurface {
+ public:
+  // Throws std::invalid_argument with a sentence where a leaf cannot be rendered.
+  TreeSurface(TreePtr tree, const Affine& object_to_world, Memory memory, Sampler sampler,
+              double missed_root);
+
+  const ProcessTree& tree() const { return *tree_; }
+  const std::vector<ProcessSurface>& leaves() const { return leaves_; }
+  Memory memory() const { return leaves_[0].memory(); }
+  // -1 where F falls as the leaf grows: gradients of F are those of the leaf times this.
+  double sign(int leaf) const { return tree_->leaves()[leaf].sign; }
+  // World-space box outside of which F > 0 for certain (infinite where unbounded).
+  const Box3& bounds() const { return bounds_; }
+
+  // Plans rays that travel inside the body too; before the first of them.
+  void serve_inside();
+
+  // The first t in (0, t_max) where F changes to F <= 0 (inside: to F >= 0), and the leaf it comes
+  // from. `lines` and
+  // `starts` hold one a leaf; lines hold the sample paths afterwards.
+  TreeHit first_hit(TreeMarch& march, std::span<Line> lines, const Ray& ray, double t_max,
+                    std::span<const Start> starts, Rng& rng, Counters& counters) const;
+
+  std::vector<std::pair<std::string, std::string>> plan() const;
+
+ private:
+  TreePtr tree_, inside_out_;
+  std::vector<ProcessSurface> leaves_;
+  std::vector<const PlannedLine*> plans_;
+  Box3 bounds_;
+};
+
+}  // namespace gpis

@@ -1,0 +1,319 @@
+"""Trees of processes against explicit joint realisations that numpy draws and composes, and their algebra."""
+
+import gpis_native as gn
+import numpy as np
+import pytest
+from statistics_checks import check_proportion, check_same_distribution, check_z
+
+pytestmark = pytest.mark.stats
+BOUNDS = ((0, -3, -3), (4, 3, 3))  # rays run along the x axis from 0 to 4
+X = np.linspace(0, 4, 321)
+
+
+@pytest.fixture
+def n(full_size):
+    return 60_000 if full_size else 10_000
+
+
+def rays(n):
+    return np.zeros((n, 3)), np.tile([1.0, 0.0, 0.0], (n, 1))
+
+
+class Leaf:
+    """A process with a mean that numpy knows, and realisations of it on the x axis."""
+
+    def __init__(self, mean, sigma, length_scale, bounds=BOUNDS):
+        self.sigma, self.length_scale = sigma, length_scale
+        kernel = gn.SquaredExponential(length_scale)
+        self.process = gn.GaussianProcess(mean, sigma, kernel, bounds=bounds)
+        points = np.column_stack([X, np.zeros((len(X), 2))])
+        self.mean = self.process.mean(points)
+        self.mean_gradient = mean.gradient(points)
+
+    def noise(self, n, rng):
+        k = np.exp(-((X[:, None] - X) ** 2) / (2 * self.length_scale**2))
+        values, vectors = np.linalg.eigh(k)
+        return rng.normal(size=(n, len(X))) @ (vectors * np.sqrt(np.maximum(values, 0))).T
+
+    def values(self, g):
+        return self.mean + self.sigma * g
+
+
+def sphere(x, y, radius, sigma, length_scale):
+    return Leaf(gn.SphereField([x, y, 0], radius), sigma, length_scale)
+
+
+A = sphere(1.6, 0.3, 0.8, 0.2, 0.5)
+B = sphere(2.4, -0.2, 0.9, 0.15, 0.35)
+C = sphere(1.9, 0.1, 0.6, 0.25, 0.4)
+SAME = [sphere(1.6, 0.3, 0.8, 0.2, 0.5), sphere(2.3, 0, 0.7, 0.3, 0.5)]
+WAVE = Leaf(gn.PlaneField([1, 0, 0], [1, 0, 0], 0.1), 0.4, 0.5)
+a, b, c = A.process, B.process, C.process
+BOX = Leaf(gn.BoxField([1.7, 0, 0], [1.2, 2, 2]), 0.0, 1.0)
+
+TREES = {
+    "union": (gn.union(a, b), [A, B], False),
+    "intersection": (gn.intersection(a, b), [A, B], False),
+    "difference": (gn.difference(a, c), [A, C], False),
+    "three": (gn.union(a, b, c), [A, B, C], False),
+    "nested": (gn.difference(gn.union(a, b), c), [A, B, C], False),
+    "complements": (gn.intersection(b, gn.complement(gn.intersection(a, gn.complement(c)))), [B, A, C], False),
+    "cut by a certain box": (gn.intersection(BOX.process, b), [BOX, B], False),
+    "waves": (gn.intersection(gn.union(a, WAVE.process), gn.complement(c)), [A, WAVE, C], False),
+    "shared union": (gn.union(*[s.process for s in SAME], shared_noise=True), SAME, True),
+    "shared difference": (gn.difference(*[s.process for s in SAME], shared_noise=True), SAME, True),
+    "shared inside": (
+        gn.difference(gn.intersection(SAME[0].process, WAVE.process, shared_noise=True), c),
+        [SAME[0], WAVE, C],
+        (0, 0, 1),
+    ),
+}
+
+
+def draw(leaves, shared, n, rng):
+    """g of each leaf (n, points)."""
+    groups = shared if isinstance(shared, tuple) else [0] * len(leaves) if shared else range(len(leaves))
+    drawn = {}
+    return [drawn[k] if k in drawn else drawn.setdefault(k, leaf.noise(n, rng)) for k, leaf in zip(groups, leaves, strict=True)]
+
+
+def first_crossings(tree, leaves, g, rng):
+    """t, leaf and gradient where F first falls to 0 on the grid; rays that start inside are left out."""
+    f = np.stack([leaf.values(x) for leaf, x in zip(leaves, g, strict=True)], axis=-1)
+    composed = tree.compose(f)
+    outside = composed[:, 0] > 0
+    f, composed = f[outside], composed[outside]
+    below = composed <= 0
+    hit = below.any(axis=1)
+    i = np.argmax(below[hit], axis=1)
+    row = np.flatnonzero(hit)
+    step = X[1] - X[0]
+    high, low = composed[row, i - 1], composed[row, i]
+    weight = high / (high - low)
+    t = np.full(len(f), np.inf)
+    t[row] = X[i - 1] + step * weight
+    # The leaf whose value is F.
+    part = np.full(len(f), -1)
+    part[row] = np.argmin(np.abs(np.abs(f[row, i]) - np.abs(low[:, None])), axis=1)
+    gradient = np.full((len(f), 3), np.nan)
+    for k, leaf in enumerate(leaves):
+        mine = row[part[row] == k]
+        j = i[part[row] == k]
+        values = f[mine][:, :, k]
+        r = np.arange(len(mine))
+        slope = (values[r, j] - values[r, j - 1]) / step
+        # Slopes across the line are independent of the line (math.md §4); F falls along the ray.
+        across = leaf.sigma / leaf.length_scale * rng.normal(size=(len(mine), 2))
+        full = np.column_stack([slope, leaf.mean_gradient[j, 1:] + across])
+        gradient[mine] = full * -np.sign(slope)[:, None]
+    return t, part, gradient
+
+
+@pytest.mark.parametrize("name", TREES)
+def test_first_hits_of_explicit_realisations(name, n, seed):
+    """Two-sample tests of t, part and gradient against dense joint realisations composed by numpy."""
+    tree, leaves, shared = TREES[name]
+    rng = np.random.default_rng(seed)
+    t, part, gradient = first_crossings(tree, leaves, draw(leaves, shared, n, rng), rng)
+    m = len(t)
+    hits = gn.first_hits(tree, *rays(m), 4, seed=seed)
+    check_same_distribution(hits["t"], t, f"{name}: t")
+    for k in range(len(leaves)):
+        p = np.mean(part == k)
+        check_proportion(np.sum(hits["part"] == k), m, p, np.sqrt(p * (1 - p) / m), f"{name}: part {k}")
+        if np.sum(part == k) < 200:
+            continue
+        check_same_distribution(hits["t"][hits["part"] == k], t[part == k], f"{name}: t of part {k}")
+        if leaves[k].sigma > 0:
+            for axis in range(3):
+                pair = hits["gradient"][hits["part"] == k, axis], gradient[part == k, axis]
+                check_same_distribution(*pair, f"{name}: gradient {axis} of part {k}")
+    hit = np.isfinite(hits["t"])
+    assert np.all(hits["gradient"][hit, 0] <= 0)  # every hit is arrived at from outside
+    assert np.array_equal(hit, hits["part"] >= 0)
+    assert hits["counters"]["line_step_limit"] == 0
+    assert hits["counters"]["line_entry_inside"] < 1e-3 * m
+
+
+def conditioned(leaf, n, rng, value, slope):
+    """g on the axis given value and, unless None, slope (n,) at x = 0."""
+    d = X / leaf.length_scale
+    k = np.exp(-(d**2) / 2)
+    covariance = np.exp(-((d[:, None] - d) ** 2) / 2) - np.outer(k, k) * (1 + np.outer(d, d) * (slope is not None))
+    values, vectors = np.linalg.eigh(covariance)
+    g = rng.normal(size=(n, len(X))) @ (vectors * np.sqrt(np.maximum(values, 0))).T
+    g += np.multiply.outer(value, k)
+    if slope is not None:
+        g += np.multiply.outer(slope * leaf.length_scale, d * k)
+    return g
+
+
+@pytest.mark.parametrize("memory", ["renewal", "renewal+", "none"])
+def test_starts_inside_other_leaves(memory, n, seed):
+    """A ray that leaves the face of a subtracted leaf, inside of what is left over (definitions B1-B3)."""
+    body = Leaf(gn.ConstantField(0.1), 0.5, 0.8)
+    hole = Leaf(gn.ConstantField(0.2), 0.4, 0.6)
+    other = Leaf(gn.ConstantField(0.3), 0.3, 0.5)  # was not sampled
+    tree = gn.union(gn.difference(body.process, hole.process), other.process)
+    value = np.tile([-0.3, 0.0, np.nan], (n, 1))
+    gradient = np.full((n, 3, 3), np.nan)
+    gradient[:, 0] = [0.4, 0.1, 0.2]
+    gradient[:, 1] = [-0.7, 0.3, -0.2]  # F = -f grows along the ray
+    hits = gn.first_hits(tree, *rays(n), 4, memory=memory, start={"value": value, "gradient": gradient}, seed=seed)
+    rng = np.random.default_rng(seed)
+    g = [leaf.noise(8 * n if memory == "none" else 3 * n, rng) for leaf in (body, hole, other)]
+    m = len(g[0])
+    if memory != "none":
+        ones = np.ones(m)
+        slope = None if memory == "renewal" else ones * 0.4 / 0.5
+        g[0] = conditioned(body, m, rng, ones * (-0.3 - 0.1) / 0.5, slope)
+        # Flux-weighted: a Rayleigh slope, downwards.
+        rayleigh = np.sqrt(-2 * np.log(rng.uniform(size=m))) / hole.length_scale
+        slope = -rayleigh if memory == "renewal" else ones * -0.7 / 0.4
+        g[1] = conditioned(hole, m, rng, ones * -0.2 / 0.4, slope)
+        g[1][:, 0] -= 1e-9  # rounding of a value of 0
+    t, part, _ = first_crossings(tree, [body, hole, other], g, rng)
+    assert len(t) > n
+    check_same_distribution(hits["t"], t, memory)
+    for k in range(3):
+        p, error = np.mean(part == k), 0.5 / np.sqrt(len(t))
+        check_proportion(np.sum(hits["part"] == k), n, p, error, f"{memory}: part {k}")
+
+
+def test_start_of_a_fresh_ray_is_joint(n, seed):
+    """Formula C7: a camera inside constant media; the signs and values at the start given F > 0."""
+    leaves = [Leaf(gn.ConstantField(mu), 1.0, 1.0) for mu in (-0.5, 0.4, -0.2)]
+    a, b, c = (leaf.process for leaf in leaves)
+    tree = gn.union(gn.intersection(a, b), gn.complement(c))
+    f = gn.line_values(tree, *rays(n), np.array([1e-9, 4.0]), seed=seed)[:, 0]
+    rng = np.random.default_rng(seed)
+    expected = rng.normal(size=(20 * n, 3)) + [-0.5, 0.4, -0.2]
+    expected = expected[tree.compose(expected) > 0]
+    drawn = np.isfinite(f)
+    assert drawn[:, 2].all() and drawn[:, :2].any(axis=1).all()
+    assert np.all(f[:, 2] < 0)
+    for k in range(3):
+        everywhere = drawn[:, k]
+        if everywhere.all():
+            check_same_distribution(f[:, k], expected[:, k], f"leaf {k}")
+    # Leaf 1 is drawn where leaf 0 alone does not decide: never conditioned on more than F > 0.
+    both = drawn[:, 0] & drawn[:, 1]
+    assert np.all((f[both, 0] > 0) | (f[both, 1] > 0))
+    check_same_distribution(f[f[:, 0] > 0, 0], expected[expected[:, 0] > 0, 0], "leaf 0 above")
+    p = np.mean(expected[:, 0] > 0)
+    check_proportion(np.sum(f[:, 0] > 0), n, p, np.sqrt(p * (1 - p) / len(expected)))
+
+
+def test_union_of_independent_constants(n, seed):
+    """Oracle 1 and 6: survivals of independent objects multiply; P(inside) = 1 - Π(1 - P)."""
+    gp = gn.GaussianProcess(0.0, 1.0, gn.SquaredExponential(1.0), bounds=((0, -1, -1), (12, 1, 1)))
+    m = 10 * n
+    origins, directions = rays(m)
+    t = gn.first_hits(gn.union(gp, gp, gp), origins, directions, 9, seed=seed)["t"]
+    survival = np.array([0.84229, 0.69407, 0.45573, 0.12893])
+    check_proportion([np.sum(t > x) for x in (0.5, 1, 2, 5)], m, survival**3, 3 * 4e-4 * survival**2)
+    values = np.column_stack([gp.sample(np.zeros((1, 3)), m, seed + k)[:, 0] for k in range(3)])
+    inside = gn.union(gp, gp, gp).compose(values) < 0
+    check_proportion(inside.sum(), m, 1 - 0.5**3)
+
+
+def same(x, y):
+    for key in ("t", "part", "gradient"):
+        np.testing.assert_array_equal(x[key], y[key])
+
+
+def test_algebra(n, seed):
+    origins, directions = rays(n)
+    empty = gn.GaussianProcess(10.0, 0.1, gn.SquaredExponential(0.3))
+
+    def hits(tree, offset=0):
+        return gn.first_hits(tree, origins, directions, 4, seed=seed + offset)
+
+    # With an empty object: the same random numbers, bit by bit; and the process itself in distribution.
+    alone = hits(gn.union(a, empty))
+    assert np.all(alone["part"][np.isfinite(alone["t"])] == 0)
+    same(alone, hits(gn.difference(a, empty)))
+    same(alone, hits(gn.union(gn.intersection(a, gn.complement(empty)), empty)))
+    single = hits(a)
+    np.testing.assert_allclose(np.sort(alone["t"])[:: n // 10], np.sort(single["t"])[:: n // 10], atol=0.1)
+    check_same_distribution(alone["t"], single["t"], "the process itself")
+    assert not np.isfinite(hits(gn.intersection(a, empty))["t"]).any()
+    # A difference with itself under shared noise touches 0 and never changes sign.
+    nothing = hits(gn.difference(a, a, shared_noise=True))
+    assert not np.isfinite(nothing["t"]).any() and nothing["counters"]["line_normals"] > n
+    # Independent noise leaves something of it.
+    assert np.isfinite(hits(gn.difference(a, a))["t"]).mean() > 0.1
+    # Idempotence under shared noise, order, De Morgan.
+    same(alone, hits(gn.union(a, a, shared_noise=True)))
+    same(alone, hits(gn.intersection(a, a, shared_noise=True)))
+    check_same_distribution(hits(gn.union(a, b))["t"], hits(gn.union(b, a), 1)["t"], "order")
+    check_same_distribution(hits(gn.intersection(a, b))["t"], hits(gn.intersection(b, a), 1)["t"], "order")
+    demorgan = gn.complement(gn.union(gn.complement(b), gn.complement(a)))
+    check_same_distribution(hits(gn.intersection(a, b))["t"], hits(demorgan, 2)["t"], "De Morgan")
+    same(hits(gn.difference(a, b)), hits(gn.intersection(a, gn.complement(b))))
+
+
+def test_what_decides_nothing_is_not_drawn(seed):
+    """Counters: two spheres that are far apart cost the one that is there; a certain box hides what it cuts off."""
+    m = 2000
+    origins, directions = rays(m)
+    far = gn.GaussianProcess(gn.SphereField([1.6, 50, 0], 0.8), 0.2, gn.SquaredExponential(0.5))
+    empty = gn.GaussianProcess(10.0, 0.1, gn.SquaredExponential(0.5))
+    alone = gn.first_hits(gn.union(a, empty), origins, directions, 4, seed=seed)["counters"]
+    pair = gn.first_hits(gn.union(a, far), origins, directions, 4, seed=seed)["counters"]
+    near = gn.first_hits(gn.union(a, b), origins, directions, 4, seed=seed)["counters"]
+    assert alone["line_normals"] == pair["line_normals"] < near["line_normals"]
+    assert alone["line_evaluations"] == pair["line_evaluations"] > 0
+    # Rays past the box: the process inside of it is never drawn, though its own rays would.
+    box = gn.GaussianProcess(gn.BoxField([2, 5, 0], [1, 1, 1]), 0, gn.SquaredExponential(1))
+    hidden = gn.first_hits(gn.intersection(box, a), origins, directions, 4, seed=seed)["counters"]
+    assert hidden["line_skipped"] == m and hidden["line_normals"] == 0
+    # Inside of what is subtracted for certain.
+    hole = gn.GaussianProcess(gn.SphereField([2, 0, 0], 2.5), 0.0, gn.SquaredExponential(1))
+    gone = gn.first_hits(gn.difference(a, hole), origins, directions, 4, seed=seed)["counters"]
+    assert gone["line_skipped"] == m and gone["line_normals"] == 0
+
+
+def test_two_spheres_of_the_paper(n, seed):
+    """Issue 5's scene: a rough sphere and an almost certain one; parts by explicit realisations elsewhere."""
+    large = gn.GaussianProcess(gn.SphereField([-0.4, 0.8, 0], 0.8), 0.1, gn.SquaredExponential(0.5))
+    small = gn.GaussianProcess(gn.SphereField([0.4, 0.8, 0], 0.5), 0.001, gn.SquaredExponential(0.5))
+    origins = np.tile([3.0, 0.8, 0.0], (n, 1))
+    hits = gn.first_hits(gn.union(large, small), origins, np.tile([-1.0, 0, 0], (n, 1)), 10, seed=seed)
+    # The small sphere ends at x = .9; the large one reaches there with probability below 1e-6 at 4 deviations.
+    assert np.mean(hits["part"] == 1) > 0.99
+    check_z(hits["t"][hits["part"] == 1].mean(), 2.1, 0.001 / np.sqrt(n) + 1e-6)
+    middle = np.tile([-0.2, 3.0, 0.0], (n, 1))
+    t = gn.first_hits(gn.union(large, small), middle, np.tile([0, -1.0, 0], (n, 1)), 10, seed=seed)
+    assert np.mean(t["part"] == 0) > 0.99
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (lambda: gn.union(), "union takes at least one operand"),
+        (lambda: gn.union(a, 3), "union: operand 1 must be a GaussianProcess or a CSG tree of them, it is a int"),
+        (lambda: gn.difference(a, None), "difference: operand 1 must be a GaussianProcess"),
+        (lambda: gn.union(a, b, shared_noise=True), "takes operands of one kernel; these have SquaredExponential"),
+        (
+            lambda: gn.first_hits(gn.union(a, b), *rays(1), 4, start={"value": [0], "gradient": [[1, 0, 0]]}),
+            r"start must hold value \(N, 2\) and gradient \(N, 2, 3\)",
+        ),
+        (lambda: gn.union(a, b).compose(np.zeros((4, 3))), "the last axis over the leaves"),
+        (
+            lambda: gn.union(a, gn.GaussianProcess(0, 0, gn.SquaredExponential(1))).plan(),
+            "Operand 1: mean and sigma are both 0",
+        ),
+    ],
+)
+def test_bad_input_gets_a_sentence(make, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        make()
+
+
+def test_plan_and_leaves():
+    tree = gn.difference(gn.union(a, b), c)
+    assert repr(tree) == "<ProcessTree intersection(union(0, 1), complement(2))>"
+    assert tree.leaves == [a, b, c]
+    plan = tree.plan()
+    assert "independent" in plan["composition"] and "leaf[2].sampler" in plan
