@@ -66,7 +66,7 @@ TreeHit TreeSurface::first_hit(TreeMarch& march, std::span<Line> lines, const Ra
   const bool kept = memory() == Memory::global;
   const auto keep = [&](bool now) {
     for (std::size_t k = 0; k < lines.size() && kept; ++k)
-      lines[k].impl().path<RealisationPath>().keep(now ? starts[k].realisation : nullptr);
+      lines[k].impl().path<RealisationPath>().keep(now ? starts[k].realisation : nullptr, false);
   };
   keep(true);
   const TreeHit hit =

@@ -19,21 +19,26 @@ def rays(n):
     return np.zeros((n, 3)), np.tile([1.0, 0.0, 0.0], (n, 1))
 
 
+def normals(covariance, n, rng):
+    values, vectors = np.linalg.eigh(covariance)
+    return rng.normal(size=(n, len(covariance))) @ (vectors * np.sqrt(np.maximum(values, 0))).T
+
+
 class Leaf:
     """A process with a mean that numpy knows, and realisations of it on the x axis."""
 
-    def __init__(self, mean, sigma, length_scale, bounds=BOUNDS):
-        self.sigma, self.length_scale = sigma, length_scale
-        kernel = gn.SquaredExponential(length_scale)
-        self.process = gn.GaussianProcess(mean, sigma, kernel, bounds=bounds)
+    def __init__(self, mean, sigma, kernel, bounds=BOUNDS):
+        self.kernel = gn.SquaredExponential(kernel) if isinstance(kernel, float) else kernel
+        self.sigma = sigma
+        self.across = sigma * np.sqrt(self.kernel.derivative_variance([0, 1, 0]))
+        self.process = gn.GaussianProcess(mean, sigma, self.kernel, bounds=bounds)
         points = np.column_stack([X, np.zeros((len(X), 2))])
+        self.covariance = self.kernel(points, points)
         self.mean = self.process.mean(points)
         self.mean_gradient = mean.gradient(points)
 
     def noise(self, n, rng):
-        k = np.exp(-((X[:, None] - X) ** 2) / (2 * self.length_scale**2))
-        values, vectors = np.linalg.eigh(k)
-        return rng.normal(size=(n, len(X))) @ (vectors * np.sqrt(np.maximum(values, 0))).T
+        return normals(self.covariance, n, rng)
 
     def values(self, g):
         return self.mean + self.sigma * g
@@ -49,6 +54,8 @@ C = sphere(1.9, 0.1, 0.6, 0.25, 0.4)
 SAME = [sphere(1.6, 0.3, 0.8, 0.2, 0.5), sphere(2.3, 0, 0.7, 0.3, 0.5)]
 WAVE = Leaf(gn.PlaneField([1, 0, 0], [1, 0, 0], 0.1), 0.4, 0.5)
 a, b, c = A.process, B.process, C.process
+MARKOV = Leaf(gn.SphereField([1.6, 0.3, 0], 0.8), 0.2, gn.Matern(1.5, 0.5))
+SPECTRAL = Leaf(gn.SphereField([1.9, 0, 0], 0.6), 0.2, gn.RationalQuadratic(1.0, 0.4))
 BOX = Leaf(gn.BoxField([1.7, 0, 0], [1.2, 2, 2]), 0.0, 1.0)
 
 TREES = {
@@ -60,6 +67,7 @@ TREES = {
     "complements": (gn.intersection(b, gn.complement(gn.intersection(a, gn.complement(c)))), [B, A, C], False),
     "cut by a certain box": (gn.intersection(BOX.process, b), [BOX, B], False),
     "waves": (gn.intersection(gn.union(a, WAVE.process), gn.complement(c)), [A, WAVE, C], False),
+    "Markov less spectral": (gn.difference(MARKOV.process, SPECTRAL.process), [MARKOV, SPECTRAL], False),
     "shared union": (gn.union(*[s.process for s in SAME], shared_noise=True), SAME, True),
     "shared difference": (gn.difference(*[s.process for s in SAME], shared_noise=True), SAME, True),
     "shared inside": (
@@ -103,7 +111,7 @@ def first_crossings(tree, leaves, g, rng):
         r = np.arange(len(mine))
         slope = (values[r, j] - values[r, j - 1]) / step
         # Slopes across the line are independent of the line (math.md §4); F falls along the ray.
-        across = leaf.sigma / leaf.length_scale * rng.normal(size=(len(mine), 2))
+        across = leaf.across * rng.normal(size=(len(mine), 2))
         full = np.column_stack([slope, leaf.mean_gradient[j, 1:] + across])
         gradient[mine] = full * -np.sign(slope)[:, None]
     return t, part, gradient
@@ -135,16 +143,14 @@ def test_first_hits_of_explicit_realisations(name, n, seed):
     assert hits["counters"]["line_entry_inside"] < 1e-3 * m
 
 
-def conditioned(leaf, n, rng, value, slope):
-    """g on the axis given value and, unless None, slope (n,) at x = 0."""
-    d = X / leaf.length_scale
+def conditioned(leaf, length_scale, n, rng, value, slope):
+    """g on the axis given value and, unless None, slope (n,) at x = 0; squared exponential."""
+    d = X / length_scale
     k = np.exp(-(d**2) / 2)
-    covariance = np.exp(-((d[:, None] - d) ** 2) / 2) - np.outer(k, k) * (1 + np.outer(d, d) * (slope is not None))
-    values, vectors = np.linalg.eigh(covariance)
-    g = rng.normal(size=(n, len(X))) @ (vectors * np.sqrt(np.maximum(values, 0))).T
-    g += np.multiply.outer(value, k)
+    covariance = leaf.covariance - np.outer(k, k) * (1 + np.outer(d, d) * (slope is not None))
+    g = normals(covariance, n, rng) + np.multiply.outer(value, k)
     if slope is not None:
-        g += np.multiply.outer(slope * leaf.length_scale, d * k)
+        g += np.multiply.outer(slope * length_scale, d * k)
     return g
 
 
@@ -166,11 +172,11 @@ def test_starts_inside_other_leaves(memory, n, seed):
     if memory != "none":
         ones = np.ones(m)
         slope = None if memory == "renewal" else ones * 0.4 / 0.5
-        g[0] = conditioned(body, m, rng, ones * (-0.3 - 0.1) / 0.5, slope)
+        g[0] = conditioned(body, 0.8, m, rng, ones * (-0.3 - 0.1) / 0.5, slope)
         # Flux-weighted: a Rayleigh slope, downwards.
-        rayleigh = np.sqrt(-2 * np.log(rng.uniform(size=m))) / hole.length_scale
+        rayleigh = np.sqrt(-2 * np.log(rng.uniform(size=m))) / 0.6
         slope = -rayleigh if memory == "renewal" else ones * -0.7 / 0.4
-        g[1] = conditioned(hole, m, rng, ones * -0.2 / 0.4, slope)
+        g[1] = conditioned(hole, 0.6, m, rng, ones * -0.2 / 0.4, slope)
         g[1][:, 0] -= 1e-9  # rounding of a value of 0
     t, part, _ = first_crossings(tree, [body, hole, other], g, rng)
     assert len(t) > n
@@ -178,6 +184,26 @@ def test_starts_inside_other_leaves(memory, n, seed):
     for k in range(3):
         p, error = np.mean(part == k), 0.5 / np.sqrt(len(t))
         check_proportion(np.sum(hits["part"] == k), n, p, error, f"{memory}: part {k}")
+
+
+def test_rays_inside(n, seed):
+    """Definitions B7: rays inside see -F: those of a tree the complement's, those of a process its own march."""
+    tree = TREES["nested"][0]
+    origins, directions = rays(n)
+    origins[:, 0] = 1.2
+    everywhere = np.ones(n, dtype=bool)
+    inside = gn.first_hits(tree, origins, directions, 2, inside=everywhere, seed=seed)
+    turned = gn.first_hits(gn.complement(tree), origins, directions, 2, seed=seed)
+    assert np.isfinite(inside["t"]).mean() > 0.5
+    np.testing.assert_array_equal(inside["t"], turned["t"])
+    np.testing.assert_array_equal(inside["gradient"], -turned["gradient"])
+    assert np.nanmin(inside["gradient"][:, 0]) >= 0
+    alone = gn.first_hits(a, origins, directions, 2, inside=everywhere, seed=seed)
+    leaf = gn.first_hits(gn.complement(a), origins, directions, 2, seed=seed)
+    check_same_distribution(alone["t"], leaf["t"], "a process")
+    for axis in range(3):
+        pair = [h["gradient"][np.isfinite(h["t"]), axis] * s for h, s in ((alone, 1), (leaf, -1))]
+        check_same_distribution(*pair, f"gradient {axis}")
 
 
 def test_start_of_a_fresh_ray_is_joint(n, seed):
@@ -293,6 +319,7 @@ def test_two_spheres_of_the_paper(n, seed):
     [
         (lambda: gn.union(), "union takes at least one operand"),
         (lambda: gn.union(a, 3), "union: operand 1 must be a GaussianProcess or a CSG tree of them, it is a int"),
+        (lambda: gn.union(a, gn.GaussianProcess(0, 1, gn.Matern(0.5, 1.0))).plan(), "Operand 1: the kernel .* no gradient"),
         (lambda: gn.difference(a, None), "difference: operand 1 must be a GaussianProcess"),
         (lambda: gn.union(a, b, shared_noise=True), "takes operands of one kernel; these have SquaredExponential"),
         (
