@@ -271,7 +271,7 @@ def test_algebra(n, seed):
     assert np.isfinite(hits(gn.difference(a, a))["t"]).mean() > 0.1
     # Idempotence under shared noise, order, De Morgan.
     same(alone, hits(gn.union(a, a, shared_noise=True)))
-    same(alone, hits(gn.intersection(a, a, shared_noise=True)))
+    check_same_distribution(alone["t"], hits(gn.intersection(a, a, shared_noise=True), 3)["t"], "idempotence")
     check_same_distribution(hits(gn.union(a, b))["t"], hits(gn.union(b, a), 1)["t"], "order")
     check_same_distribution(hits(gn.intersection(a, b))["t"], hits(gn.intersection(b, a), 1)["t"], "order")
     demorgan = gn.complement(gn.union(gn.complement(b), gn.complement(a)))
