@@ -90,8 +90,8 @@ void bind_tree(py::module_& m) {
   m.def(
       "difference",
       [](const py::object& a, const py::object& b, bool shared_noise) {
-        const TreePtr kept = tree_argument(a, "difference: operand 0");
-        const TreePtr removed = ProcessTree::complement(*tree_argument(b, "difference: operand 1"));
+        const TreePtr kept = tree_argument(a, "difference: a");
+        const TreePtr removed = ProcessTree::complement(*tree_argument(b, "difference: b"));
         return std::const_pointer_cast<ProcessTree>(ProcessTree::combine(
             ProcessTree::Kind::greatest, {kept, removed}, shared_noise, "difference"));
       },
@@ -101,7 +101,7 @@ void bind_tree(py::module_& m) {
       "complement",
       [](const py::object& a) {
         return std::const_pointer_cast<ProcessTree>(
-            ProcessTree::complement(*tree_argument(a, "complement: operand 0")));
+            ProcessTree::complement(*tree_argument(a, "complement: a")));
       },
       "a"_a, "Inside where a is not: -a.");
 }

@@ -320,7 +320,7 @@ def test_two_spheres_of_the_paper(n, seed):
         (lambda: gn.union(), "union takes at least one operand"),
         (lambda: gn.union(a, 3), "union: operand 1 must be a GaussianProcess or a CSG tree of them, it is a int"),
         (lambda: gn.union(a, gn.GaussianProcess(0, 1, gn.Matern(0.5, 1.0))).plan(), "Operand 1: the kernel .* no gradient"),
-        (lambda: gn.difference(a, None), "difference: operand 1 must be a GaussianProcess"),
+        (lambda: gn.difference(a, None), "difference: b must be a GaussianProcess"),
         (lambda: gn.union(a, b, shared_noise=True), "takes operands of one kernel; these have SquaredExponential"),
         (
             lambda: gn.first_hits(gn.union(a, b), *rays(1), 4, start={"value": [0], "gradient": [[1, 0, 0]]}),
