@@ -93,8 +93,8 @@ class ImageEnvironment final : public Light {
     double column = u * width_ - 0.5;
     if (column < 0) column += width_;
     const double row = v * height_ + 0.5;
-    const int i = std::min(static_cast<int>(column), width_ - 1),
-              j = std::min(static_cast<int>(row), height_);
+    const int i = std::clamp(static_cast<int>(column), 0, width_ - 1),
+              j = std::clamp(static_cast<int>(row), 0, height_);
     const double a = column - i, b = row - j;
     const Color low = texel(i, j - 1) * (1 - a) + texel(i + 1, j - 1) * a;
     const Color high = texel(i, j) * (1 - a) + texel(i + 1, j) * a;
