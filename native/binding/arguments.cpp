@@ -67,8 +67,9 @@ std::vector<Vec3> points_argument(const py::handle& value, const std::string& na
     throw std::invalid_argument(name + " must be an array of shape (N, 3).");
   }
   std::vector<Vec3> points(a.shape(0));
-  for (py::ssize_t i = 0; i < a.shape(0); ++i) {
-    points[i] = {a.at(i, 0), a.at(i, 1), a.at(i, 2)};
+  const double* at = a.data();
+  for (py::ssize_t i = 0; i < a.shape(0); ++i, at += 3) {
+    points[i] = {at[0], at[1], at[2]};
     if (!is_finite(points[i]))
       throw std::invalid_argument(name + "[" + std::to_string(i) +
                                   "] is not finite: every coordinate must be a number.");

@@ -1,6 +1,5 @@
-// One function per folder of native/ (render has two), each in a file of its own, called by
-// module.cpp in an order in which a type is known to Python before another one's signature names
-// it.
+// One function a file, called by module.cpp in an order in which a type is known to Python before
+// another one's signature names it.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -14,6 +13,7 @@ void bind_kernel(pybind11::module_& m);
 void bind_process(pybind11::module_& m);
 void bind_realisation(pybind11::module_& m);
 void bind_tree(pybind11::module_& m);
+void bind_first_hits(pybind11::module_& m);
 void bind_scene(pybind11::module_& m);
 void bind_film(pybind11::module_& m);
 void bind_render(pybind11::module_& m);

@@ -1,0 +1,232 @@
+#include "binding/first_hits_arguments.h"
+
+#include <pybind11/numpy.h>
+#include <pybind11/stl.h>
+
+#include <limits>
+
+namespace gpis {
+namespace py = pybind11;
+using namespace py::literals;
+namespace {
+
+using Array = NumberArray;
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+// As render takes; TBB overflows its stack at a million.
+constexpr int kMostThreads = 1024;
+
+Sampler sampler_argument(const std::string& name) {
+  if (name == "auto") return Sampler::automatic;
+  if (name == "convolution") return Sampler::convolution;
+  if (name == "markov") return Sampler::markov;
+  if (name == "nystrom") return Sampler::nystrom;
+  if (name == "spectral") return Sampler::spectral;
+  if (name == "dense") return Sampler::dense;
+  if (name == "realisation") return Sampler::realisation;
+  throw std::invalid_argument("sampler is '" + name +
+                              "', it takes 'auto', 'convolution', 'markov', 'spectral', 'nystrom', "
+                              "'dense' or 'realisation'.");
+}
+
+double tolerance_argument(double tolerance) {
+  if (!(tolerance > 0 && tolerance < 1))
+    throw std::invalid_argument("tolerance must lie between 0 and 1, it is " +
+                                std::to_string(tolerance) + ".");
+  return tolerance;
+}
+
+// What rows have seen of their realisations, memory `global`: seed (N,), and where they were moved
+// outside, point (N, 3), value (N,), NaN where they were not; of a tree for each of its leaves.
+std::vector<RealisationMemory> realisations_argument(const py::handle& argument, std::size_t n,
+                                                     std::size_t leaves) {
+  constexpr const char* sentence =
+      "start['realisation'] must be a dict of seed (N,), entry (N, 3) and shift (N,), as in the "
+      "state of earlier hits.";
+  if (!py::isinstance<py::dict>(argument)) throw std::invalid_argument(sentence);
+  const auto dict = py::reinterpret_borrow<py::dict>(argument);
+  for (const char* key : {"seed", "entry", "shift"})
+    if (!dict.contains(key) || py::len(dict) != 3) throw std::invalid_argument(sentence);
+  const auto seed =
+      py::array_t<std::uint64_t, py::array::c_style | py::array::forcecast>::ensure(dict["seed"]);
+  const Array entry = Array::ensure(dict["entry"]), shift = Array::ensure(dict["shift"]);
+  const auto count = static_cast<py::ssize_t>(n * leaves);
+  const py::ssize_t rank = leaves > 1 ? 2 : 1;
+  if (!seed || !entry || !shift || seed.ndim() != rank || shift.ndim() != rank ||
+      entry.ndim() != rank + 1 || entry.shape(rank) != 3 || seed.size() != count ||
+      shift.size() != count || entry.size() != 3 * count) {
+    PyErr_Clear();
+    throw std::invalid_argument(sentence);
+  }
+  std::vector<RealisationMemory> out(count);
+  for (py::ssize_t i = 0; i < count; ++i) {
+    out[i].seed = seed.data()[i];
+    const double* at = entry.data() + 3 * i;
+    if (std::isfinite(shift.data()[i]))
+      out[i].entry = {true, {at[0], at[1], at[2]}, {shift.data()[i], {}}};
+  }
+  return out;
+}
+
+py::dict realisations_dict(const std::vector<RealisationMemory>& realisations, py::ssize_t leaves) {
+  const auto count = static_cast<py::ssize_t>(realisations.size());
+  std::vector<py::ssize_t> shape{count / leaves};
+  if (leaves > 1) shape.push_back(leaves);
+  py::array_t<std::uint64_t> seed(shape);
+  Array shift(shape);
+  shape.push_back(3);
+  Array entry(shape);
+  for (py::ssize_t i = 0; i < count; ++i) {
+    const RealisationMemory& r = realisations[i];
+    seed.mutable_data()[i] = r.seed;
+    shift.mutable_data()[i] = r.entry.active ? r.entry.weight.value : kNan;
+    for (int k = 0; k < 3; ++k)
+      entry.mutable_data()[3 * i + k] = r.entry.active ? r.entry.at[k] : kNan;
+  }
+  return py::dict("seed"_a = seed, "entry"_a = entry, "shift"_a = shift);
+}
+
+// value (N,) and gradient (N, 3); of a tree (N, leaves) and (N, leaves, 3), NaN where nothing is
+// known.
+void read_states(const py::handle& values, const py::handle& gradients, std::size_t leaves,
+                 FirstHitsQuery& query) {
+  const Array value = Array::ensure(values), gradient = Array::ensure(gradients);
+  const auto rays = static_cast<py::ssize_t>(query.rays.size());
+  const auto count = static_cast<py::ssize_t>(leaves);
+  const bool tree = leaves > 1;
+  const bool fits = value && gradient && value.ndim() == 1 + tree && gradient.ndim() == 2 + tree &&
+                    value.shape(0) == rays && gradient.shape(0) == rays &&
+                    gradient.shape(1 + tree) == 3 &&
+                    (!tree || (value.shape(1) == count && gradient.shape(1) == count));
+  if (!fits) {
+    PyErr_Clear();
+    const std::string n = tree ? "(N, " + std::to_string(leaves) : "(N";
+    throw std::invalid_argument("start must hold value " + n + (tree ? ")" : ",)") +
+                                " and gradient " + n + ", 3), one row a ray.");
+  }
+  query.start.reserve(rays * count);
+  const double *v = value.data(), *g = gradient.data();
+  for (py::ssize_t i = 0; i < rays * count; ++i, ++v, g += 3) {
+    const Vec3 at{g[0], g[1], g[2]};
+    const bool nothing = tree && std::isnan(*v);
+    const bool inside = !query.inside.empty() && query.inside[i / count];
+    if (!nothing && (!std::isfinite(*v) || (!tree && (inside ? -*v : *v) < 0)))
+      throw std::invalid_argument(
+          "start['value'][" + std::to_string(i / count) +
+          "] must be 0 (on the surface) or positive (outside; negative for rays inside), and "
+          "finite.");
+    if (!nothing && !is_finite(at))
+      throw std::invalid_argument("start['gradient'][" + std::to_string(i / count) +
+                                  "] is not finite: every coordinate must be a number.");
+    query.start.push_back({*v, at});
+  }
+}
+
+void read_start(const py::object& start, std::size_t leaves, FirstHitsQuery& query) {
+  if (!py::isinstance<py::dict>(start))
+    throw std::invalid_argument("start must be None or a dict of value and gradient.");
+  const auto s = py::reinterpret_borrow<py::dict>(start);
+  for (const auto& item : s) {
+    const auto key = py::str(item.first).cast<std::string>();
+    if (key != "value" && key != "gradient" && key != "realisation")
+      throw std::invalid_argument("start: unknown key '" + key +
+                                  "' (takes value, gradient, realisation).");
+  }
+  if (!s.contains("value") || !s.contains("gradient"))
+    throw std::invalid_argument("start must hold value (N,) and gradient (N, 3).");
+  read_states(s["value"], s["gradient"], leaves, query);
+  if (s.contains("realisation"))
+    query.realisation = realisations_argument(s["realisation"], query.rays.size(), leaves);
+}
+
+void read_rays(const py::object& origins, const py::object& directions, FirstHitsQuery& query) {
+  const auto o = points_argument(origins, "origins"), d = points_argument(directions, "directions");
+  if (o.size() != d.size())
+    throw std::invalid_argument("origins and directions must have as many rows, they have " +
+                                std::to_string(o.size()) + " and " + std::to_string(d.size()) +
+                                ".");
+  query.rays.reserve(o.size());
+  for (std::size_t i = 0; i < o.size(); ++i) {
+    if (std::abs(length(d[i]) - 1) > 1e-6)
+      throw std::invalid_argument("directions[" + std::to_string(i) +
+                                  "] must have length 1, it has " + std::to_string(length(d[i])) +
+                                  ".");
+    query.rays.push_back({o[i], d[i]});
+  }
+}
+
+void read_inside(const py::object& inside, FirstHitsQuery& query) {
+  const auto flags = py::array_t<bool, py::array::c_style>::ensure(inside);
+  if (!py::isinstance<py::array_t<bool>>(inside) || !flags || flags.ndim() != 1 ||
+      static_cast<std::size_t>(flags.shape(0)) != query.rays.size()) {
+    PyErr_Clear();
+    throw std::invalid_argument("inside must be an array of truth values, one a ray.");
+  }
+  query.inside.assign(flags.data(), flags.data() + query.rays.size());
+}
+
+FirstHitsQuery query_argument(const FirstHitsArguments& arguments, std::size_t leaves,
+                              double t_max) {
+  FirstHitsQuery query;
+  read_rays(arguments.origins, arguments.directions, query);
+  if (!(t_max > 0))
+    throw std::invalid_argument("t_max must be positive, it is " + std::to_string(t_max) + ".");
+  if (arguments.threads < 0 || arguments.threads > kMostThreads)
+    throw std::invalid_argument("threads must be 0 (all cores) to " + std::to_string(kMostThreads) +
+                                ", it is " + std::to_string(arguments.threads) + ".");
+  if (!arguments.inside.is_none()) read_inside(arguments.inside, query);
+  if (!arguments.start.is_none()) read_start(arguments.start, leaves, query);
+  query.t_max = t_max;
+  query.first_index = arguments.first_index;
+  query.seed = arguments.seed;
+  query.threads = arguments.threads;
+  query.interrupted = [] {
+    const py::gil_scoped_acquire acquire;
+    return PyErr_CheckSignals() != 0;
+  };
+  return query;
+}
+
+}  // namespace
+
+FirstHitsSetup first_hits_setup(const FirstHitsArguments& arguments, double t_max) {
+  const TreePtr tree = tree_argument(arguments.gp, "gp");
+  FirstHitsQuery query = query_argument(arguments, tree->leaves().size(), t_max);
+  TreeSurface surface(tree, {}, memory_argument(arguments.memory, "memory"),
+                      sampler_argument(arguments.sampler), tolerance_argument(arguments.tolerance));
+  if (!query.inside.empty()) surface.serve_inside();
+  return {std::move(surface), std::move(query)};
+}
+
+py::dict hits_dict(const FirstHits& hits, const FirstHitsSetup& setup) {
+  const py::ssize_t n = setup.query.rays.size();
+  const auto leaves = static_cast<py::ssize_t>(setup.surface.leaves().size());
+  std::vector<py::ssize_t> shape{n};
+  if (leaves > 1) shape.push_back(leaves);
+  Array t(n), position({n, py::ssize_t{3}}), gradient({n, py::ssize_t{3}}), value(shape);
+  shape.push_back(3);
+  Array slopes(shape);
+  py::array_t<std::int32_t> part(n);
+  std::copy(hits.t.begin(), hits.t.end(), t.mutable_data());
+  std::copy(hits.leaf.begin(), hits.leaf.end(), part.mutable_data());
+  const auto write = [](double* to, const Vec3& v) {
+    for (int k = 0; k < 3; ++k) to[k] = v[k];
+  };
+  double *p = position.mutable_data(), *g = gradient.mutable_data();
+  for (py::ssize_t i = 0; i < n; ++i, p += 3, g += 3) {
+    write(g, hits.gradient[i]);
+    write(p, hits.leaf[i] < 0 ? Vec3{kNan, kNan, kNan} : setup.query.rays[i].at(hits.t[i]));
+  }
+  double *v = value.mutable_data(), *s = slopes.mutable_data();
+  for (const State& state : hits.state) {
+    *v++ = state.value;
+    write(s, state.gradient);
+    s += 3;
+  }
+  py::dict state("value"_a = value, "gradient"_a = slopes);
+  if (!hits.realisation.empty()) state["realisation"] = realisations_dict(hits.realisation, leaves);
+  return py::dict("t"_a = t, "position"_a = position, "gradient"_a = gradient, "part"_a = part,
+                  "state"_a = state, "counters"_a = counters_dict(hits.counters));
+}
+
+}  // namespace gpis
