@@ -30,6 +30,20 @@ def last(scene_name):
     return _last.get(scene_name)
 
 
+def plan_by_owner(scene_name):
+    """The plan of the last render, a dict for each object: owner -> name -> sentence. "Scene" owns what has no object."""
+    owners = {}
+    for key, sentence in (last(scene_name) or {"plan": {}})["plan"].items():
+        owner, _, name = key.rpartition(": ")
+        owners.setdefault(owner or "Scene", {})[name] = str(sentence)
+    return owners
+
+
+def sampler_of(scene_name, object_name):
+    """Which sampler the last render took for a GPIS object, and why; empty where it has not met the object."""
+    return plan_by_owner(scene_name).get(f'GPIS object "{object_name}"', {}).get("sampler", "")
+
+
 def forget():
     _last.clear()
 

@@ -9,6 +9,9 @@ import bpy
 
 from .native import native
 
+# Grids of A(x), the squared length scales: (xx, yy, zz) and (xy, xz, yz).
+ANISOTROPY_GRIDS = ("anisotropy_diagonal", "anisotropy_offdiagonal")
+
 # (path, time of change, size) -> list of grids: panels ask at every redraw.
 _grids = {}
 
@@ -41,15 +44,22 @@ def unpacked(data):
     return str(path)
 
 
-def grids(path):
-    """The scalar grids of a .vdb that hold anything, as the native `vdb_grids` describes them."""
+def _all_grids(path):
     stat = os.stat(path)
     key = (path, stat.st_mtime_ns, stat.st_size)
     if key not in _grids:
-        _grids[key] = [
-            grid for grid in native().vdb_grids(path) if grid["type"] in {"float", "double"} and grid["min"] is not None
-        ]
+        _grids[key] = [grid for grid in native().vdb_grids(path) if grid["min"] is not None]
     return _grids[key]
+
+
+def grids(path):
+    """The scalar grids of a .vdb that hold anything, as the native `vdb_grids` describes them."""
+    return [grid for grid in _all_grids(path) if grid["type"] in {"float", "double"}]
+
+
+def vector_grid_names(path):
+    """Names of the grids of a .vdb that hold vectors, and anything at all."""
+    return [grid["name"] for grid in _all_grids(path) if grid["type"].startswith("vec3")]
 
 
 def grid_names(data):

@@ -4,14 +4,12 @@ import numpy as np
 
 from .. import volume
 from ..native import native
-from . import materials
+from . import kernel, materials
+from .kernel import check_positive
 from .state import SyncError, array
 
 # Deviations between the surface and the bounds below which a visible part of the surfaces is cut off (one in 740).
 _SAFE_DEVIATIONS = 3.0
-
-# What an infinity that is typed into a panel becomes: Blender keeps the largest number of single precision.
-_INFINITE = float(np.finfo(np.float32).max)
 
 
 def add(sync, obj, matrix_world):
@@ -39,6 +37,7 @@ def add(sync, obj, matrix_world):
             "matrix": matrix,
             "materials": names[:1],
             "memory": obj.gpis.memory.lower().replace("_plus", "+"),
+            "sampler": obj.gpis.sampler.lower(),
         }
     )
 
@@ -51,7 +50,7 @@ def _process(sync, owner, obj):
     gn = native()
     mean = gn.VdbField(path, settings.mean_grid, meaning="value")
     if settings.sigma_source == "CONSTANT":
-        _check_positive(owner, "standard deviation σ", settings.sigma)
+        check_positive(owner, "standard deviation σ", settings.sigma)
         sigma = gn.ConstantField(settings.sigma)
         _warn_if_cut(sync, owner, obj, settings.sigma)
     else:
@@ -61,21 +60,31 @@ def _process(sync, owner, obj):
                 f'{owner}: say whether grid "{settings.sigma_grid}" holds the standard deviation σ or the variance σ² '
                 "(Object properties, GPIS). Files differ, and names do not tell."
             )
-        _check_positive(owner, "factor on σ", settings.sigma_factor)
+        check_positive(owner, "factor on σ", settings.sigma_factor)
         meaning = "variance" if settings.sigma_meaning == "VARIANCE" else "value"
         sigma = gn.VdbField(path, settings.sigma_grid, meaning=meaning)
         if settings.sigma_factor != 1:
             sigma = settings.sigma_factor * sigma
-    _check_positive(owner, "length scale ℓ", settings.length_scale)
-    kernel = gn.SquaredExponential(settings.length_scale)
-    return gn.GaussianProcess(mean, sigma, kernel, bounds=(mean_grid["min"], mean_grid["max"]))
+    return gn.GaussianProcess(
+        mean,
+        sigma,
+        kernel.describe(owner, settings),
+        anisotropy=_anisotropy(owner, settings, path),
+        bounds=(mean_grid["min"], mean_grid["max"]),
+    )
 
 
-def _check_positive(owner, what, value):
-    if not value > 0:
-        raise SyncError(f"{owner}: the {what} is {value:g}, it must be above 0.")
-    if value >= _INFINITE:
-        raise SyncError(f"{owner}: the {what} is infinite, it must be a finite number.")
+def _anisotropy(owner, settings, path):
+    """The tensor field of squared length scales, or None where they are the same everywhere."""
+    if settings.anisotropy != "GRID":
+        return None
+    missing = [name for name in volume.ANISOTROPY_GRIDS if name not in volume.vector_grid_names(path)]
+    if missing:
+        raise SyncError(
+            f'{owner}: its anisotropy is to come from grids, but "{path}" holds no '
+            f"{' and no '.join(missing)}: paint it, or choose Uniform or Axes (Object properties, GPIS, Anisotropy)."
+        )
+    return native().VdbTensorField(path)
 
 
 def _grid(owner, what, name, grids, path):

@@ -3,9 +3,10 @@
 import bpy
 import numpy as np
 
-from .. import volume
+from .. import statistics, volume
 from ..bake.operators import made_of
 from .render_panels import ENGINE
+from .text import wrapped
 
 
 def world_lengths(matrix_world, length):
@@ -39,7 +40,70 @@ class GPIS_PT_object(bpy.types.Panel):
         layout.active = context.object.gpis.enabled
         _draw_fields(layout, context)
         _draw_kernel(layout, context)
-        _draw_source(layout, context.object.gpis)
+
+
+class _VolumePanel:
+    """Below the GPIS panel of a Volume object."""
+
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "object"
+    bl_parent_id = "GPIS_PT_object"
+
+    @classmethod
+    def poll(cls, context):
+        return context.object.type == "VOLUME"
+
+    def draw(self, context):
+        self.layout.use_property_split = True
+        self.layout.use_property_decorate = False
+        self.layout.active = context.object.gpis.enabled
+        self.content(self.layout, context)
+
+
+class GPIS_PT_anisotropy(_VolumePanel, bpy.types.Panel):
+    bl_label = "Anisotropy"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def content(self, layout, context):
+        obj, settings = context.object, context.object.gpis
+        layout.row().prop(settings, "anisotropy", expand=True)
+        if settings.anisotropy == "AXES":
+            column = layout.column()
+            column.prop(settings, "ratios")
+            column.row(heading="Infinite").prop(settings, "infinite", toggle=True, text="")
+            column.prop(settings, "rotation")
+        elif settings.anisotropy == "GRID":
+            _draw_anisotropy_grids(layout, obj)
+            layout.prop(settings, "anisotropy_factor")
+
+
+class GPIS_PT_paths(_VolumePanel, bpy.types.Panel):
+    bl_label = "Light Paths"
+
+    def content(self, layout, context):
+        settings = context.object.gpis
+        layout.prop(settings, "memory")
+        layout.prop(settings, "sampler")
+        sentence = statistics.sampler_of(context.scene.name, context.object.name)
+        if sentence:
+            wrapped(layout.column(align=True), context, f"Last render: {sentence}", indent=True)
+
+
+class GPIS_PT_source(_VolumePanel, bpy.types.Panel):
+    bl_label = "Source Mesh"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and context.object.gpis.source is not None
+
+    def content(self, layout, context):
+        settings = context.object.gpis
+        layout.prop(settings, "source")
+        layout.prop(settings, "bake_resolution")
+        row = layout.row(align=True)
+        row.operator("gpis.rebake", icon="FILE_REFRESH")
+        row.operator("gpis.remove", icon="X", text="Remove")
 
 
 def _draw_mesh(layout, obj):
@@ -80,9 +144,27 @@ def _draw_kernel(layout, context):
     settings = context.object.gpis
     column = layout.column()
     column.prop(settings, "kernel")
-    column.prop(settings, "length_scale")
-    _draw_world(column, context, settings.length_scale)
-    layout.prop(settings, "memory")
+    if settings.anisotropy == "GRID":
+        column.label(text="Length scales come from grids", icon="VOLUME_DATA")
+    else:
+        column.prop(settings, "length_scale")
+        _draw_world(column, context, settings.length_scale)
+    if settings.kernel == "RATIONAL_QUADRATIC":
+        column.prop(settings, "alpha")
+    elif settings.kernel == "LOCALLY_PERIODIC":
+        column.prop(settings, "period")
+        column.prop(settings, "periodic_scale")
+        column.prop(settings, "axis")
+
+
+def _draw_anisotropy_grids(layout, obj):
+    try:
+        names = volume.vector_grid_names(volume.path_of(obj.data))
+    except (ValueError, OSError, RuntimeError):
+        return  # the fields above say why
+    for name in volume.ANISOTROPY_GRIDS:
+        there = name in names
+        layout.label(text=name if there else f"No grid {name}", icon="VOLUME_DATA" if there else "ERROR")
 
 
 def _draw_world(layout, context, length):
@@ -100,20 +182,14 @@ def _length(context, value):
     return bpy.utils.units.to_string(units.system, "LENGTH", float(value) * units.scale_length, precision=3)
 
 
-def _draw_source(layout, settings):
-    if settings.source is None:
-        return
-    layout.separator()
-    layout.prop(settings, "source")
-    layout.prop(settings, "bake_resolution")
-    row = layout.row(align=True)
-    row.operator("gpis.rebake", icon="FILE_REFRESH")
-    row.operator("gpis.remove", icon="X", text="Remove")
+_CLASSES = (GPIS_PT_object, GPIS_PT_anisotropy, GPIS_PT_paths, GPIS_PT_source)
 
 
 def register():
-    bpy.utils.register_class(GPIS_PT_object)
+    for cls in _CLASSES:
+        bpy.utils.register_class(cls)
 
 
 def unregister():
-    bpy.utils.unregister_class(GPIS_PT_object)
+    for cls in reversed(_CLASSES):
+        bpy.utils.unregister_class(cls)

@@ -6,6 +6,7 @@ import bpy
 
 from .. import statistics
 from ..session import clock
+from .text import wrapped
 
 ENGINE = "GPIS"
 
@@ -88,6 +89,8 @@ class GPIS_PT_statistics(_RenderPanel, bpy.types.Panel):
 
 
 class GPIS_PT_plan(_RenderPanel, bpy.types.Panel):
+    """Which sampler serves each object and why, and what the render leaves out"""
+
     bl_label = "Plan"
     bl_parent_id = "GPIS_PT_statistics"
     bl_options = {"DEFAULT_CLOSED"}
@@ -96,10 +99,12 @@ class GPIS_PT_plan(_RenderPanel, bpy.types.Panel):
     def poll(cls, context):
         return super().poll(context) and statistics.last(context.scene.name) is not None
 
-    def content(self, layout, scene):
-        column = layout.column(align=True)
-        for name, sentence in statistics.last(scene.name)["plan"].items():
-            _row(column, name, str(sentence))
+    def draw(self, context):
+        for owner, rows in statistics.plan_by_owner(context.scene.name).items():
+            column = self.layout.column(align=True)
+            column.label(text=owner, icon="VOLUME_DATA" if owner.startswith("GPIS object") else "SCENE_DATA")
+            for name, sentence in rows.items():
+                wrapped(column, context, f"{name.replace('_', ' ').capitalize()}: {sentence}", icon="BLANK1")
 
 
 def _switched(layout, owner, switch, name, text):

@@ -4,6 +4,7 @@ Every test file is plain pytest and imports bpy. The add-on is always the instal
 its own, so what is tested is what an artist gets.
 """
 
+import importlib
 import os
 import shutil
 import subprocess
@@ -21,6 +22,8 @@ if "bpy" not in sys.modules and "BLENDER_USER_RESOURCES" not in os.environ:
 
 import bpy  # noqa: E402
 
+from . import support  # noqa: E402
+
 EXTENSION = "bl_ext.user_default.gpis"
 
 
@@ -36,9 +39,7 @@ def extension_zip():
 def extension(extension_zip):
     """The zip, installed and enabled; gives the module's name."""
     assert "BLENDER_USER_RESOURCES" in os.environ, "start Blender with a BLENDER_USER_RESOURCES of its own"
-    result = bpy.ops.extensions.package_install_files(
-        filepath=str(extension_zip), repo="user_default", enable_on_install=True
-    )
+    result = bpy.ops.extensions.package_install_files(filepath=str(extension_zip), repo="user_default", enable_on_install=True)
     assert result == {"FINISHED"}
     assert EXTENSION in bpy.context.preferences.addons
     return EXTENSION
@@ -50,6 +51,37 @@ def empty_scene(extension):
     bpy.ops.wm.read_homefile(use_factory_startup=False, use_empty=True)
     bpy.context.scene.render.engine = "GPIS"
     return bpy.context.scene
+
+
+@pytest.fixture
+def stage(empty_scene):
+    """A white world, a camera six metres in front of the origin, a small picture."""
+    support.settings(empty_scene, width=48, height=36, samples=32)
+    support.world(empty_scene, (1, 1, 1))
+    support.camera(empty_scene, (0, -6, 0))
+    return empty_scene
+
+
+@pytest.fixture
+def describe(extension):
+    """The GPIS objects of the description and the warnings, as the scene stands."""
+    sync = importlib.import_module(extension + ".sync")
+
+    def describe():
+        bpy.context.view_layer.update()
+        state = sync.describe(bpy.context.evaluated_depsgraph_get(), 48, 36)
+        return [entry for entry in state.description["objects"] if entry["type"] == "gpis"], state.warnings
+
+    return describe
+
+
+@pytest.fixture
+def ball(stage):
+    """A GPIS of a black sphere of radius 1, by the operator."""
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24)
+    bpy.context.object.data.materials.append(support.diffuse("Black", (0, 0, 0)))
+    assert bpy.ops.gpis.make(resolution=48) == {"FINISHED"}
+    return bpy.context.object
 
 
 @pytest.fixture

@@ -199,3 +199,8 @@ def failure(scene, path, **keywords):
         picture(scene, path, **keywords)
     assert not list(path.glob("*.exr")), "a failed render must not write an image"
     return str(caught.value)
+
+
+def coverage(scene, path):
+    """Per pixel: how much of the white world a black body hides."""
+    return 1 - picture(scene, path)[..., 0]

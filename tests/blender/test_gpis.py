@@ -9,43 +9,9 @@ import numpy as np
 import pytest
 
 from . import support
+from .support import coverage
 
 BUNNY = Path(__file__).parents[3] / "shared" / "data" / "gpis-light-transport" / "bunny.vdb"
-
-
-@pytest.fixture
-def stage(empty_scene):
-    support.settings(empty_scene, width=48, height=36, samples=32)
-    support.world(empty_scene, (1, 1, 1))
-    support.camera(empty_scene, (0, -6, 0))
-    return empty_scene
-
-
-@pytest.fixture
-def describe(extension):
-    """The GPIS objects of the description and the warnings, as the scene stands."""
-    sync = importlib.import_module(extension + ".sync")
-
-    def describe():
-        bpy.context.view_layer.update()
-        state = sync.describe(bpy.context.evaluated_depsgraph_get(), 48, 36)
-        return [entry for entry in state.description["objects"] if entry["type"] == "gpis"], state.warnings
-
-    return describe
-
-
-@pytest.fixture
-def ball(stage):
-    """A GPIS of a black sphere of radius 1, by the operator."""
-    bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24)
-    bpy.context.object.data.materials.append(support.diffuse("Black", (0, 0, 0)))
-    assert bpy.ops.gpis.make(resolution=48) == {"FINISHED"}
-    return bpy.context.object
-
-
-def coverage(stage, path):
-    """Per pixel: how much of the white world a black body hides."""
-    return 1 - support.picture(stage, path)[..., 0]
 
 
 def test_make_puts_a_volume_in_place_of_the_mesh(ball):
@@ -106,13 +72,6 @@ def test_instances_of_a_gpis(stage, ball, tmp_path):
         empty = support.link(stage, "Instance", None, location=(x, 0, 0))
         empty.instance_type, empty.instance_collection = "COLLECTION", group
     assert coverage(stage, tmp_path).sum() == pytest.approx(2 * 0.16 * one, rel=0.1)
-
-
-@pytest.mark.parametrize("memory", ["NONE", "RENEWAL", "RENEWAL_PLUS"])
-def test_memories_reach_the_renderer(ball, describe, memory):
-    ball.gpis.memory = memory
-    (entry,), _ = describe()
-    assert entry["memory"] == {"NONE": "none", "RENEWAL": "renewal", "RENEWAL_PLUS": "renewal+"}[memory]
 
 
 def test_open_mesh_is_closed_with_a_note(stage, extension):
