@@ -1,13 +1,15 @@
-"""Making GPIS objects: signed distances baked from meshes into versioned .vdb files."""
+"""Making GPIS objects: signed distances baked from meshes, shapes and fogs into versioned .vdb files."""
 
-from . import files, operators
+from . import add, files, operators
+
+_PARTS = (operators, add, files)
 
 
 def register():
-    operators.register()
-    files.register()
+    for part in _PARTS:
+        part.register()
 
 
 def unregister():
-    files.unregister()
-    operators.unregister()
+    for part in reversed(_PARTS):
+        part.unregister()

@@ -40,6 +40,12 @@ def new_path(name):
     return _remember(_next(place, bpy.path.clean_name(name) or "gpis"))
 
 
+def point(data, path):
+    """Give a volume a file that was written for it."""
+    data.filepath = bpy.path.relpath(str(path)) if bpy.data.filepath else str(path)
+    data.gpis_baked = True
+
+
 def _next(place, name):
     taken = [version for known, version, _ in _versions(place) if known == name]
     for path in _session:

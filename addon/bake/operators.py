@@ -18,6 +18,11 @@ _LEAST_MARGIN = 0.1
 _VOLUME_CODE = int.from_bytes(b"VO", "little")
 
 
+def automatic_margin(sigma, size):
+    """Room around a surface of this size, so that next to nothing of its random surface is cut off."""
+    return max(_MARGIN_SIGMAS * sigma, _LEAST_MARGIN * size)
+
+
 def mesh_arrays(depsgraph, source):
     """Vertices (N,3) and triangles (M,3) of a mesh object with its modifiers, in its own coordinates."""
     evaluated = source.evaluated_get(depsgraph)
@@ -46,7 +51,7 @@ def bake(context, volume_object, *, resolution, margin):
         settings.sigma = DEFAULT_SIGMA * size
     if not settings.is_property_set("length_scale"):
         settings.length_scale = DEFAULT_LENGTH_SCALE * size
-    margin = margin or max(_MARGIN_SIGMAS * settings.sigma, _LEAST_MARGIN * size)
+    margin = margin or automatic_margin(settings.sigma, size)
     path = files.new_path(source.name)
 
     window_manager = context.window_manager
@@ -63,8 +68,7 @@ def bake(context, volume_object, *, resolution, margin):
         data = volume_object.data = data.copy()
     if data.packed_file:  # the old bytes, which Blender would otherwise keep
         bpy.ops.file.unpack_item(id_name=data.name, id_type=_VOLUME_CODE, method="USE_ORIGINAL")
-    data.filepath = bpy.path.relpath(str(path)) if bpy.data.filepath else str(path)
-    data.gpis_baked = True
+    files.point(data, path)
     settings.bake_resolution = resolution
     settings.bake_margin = margin
     settings.mean_grid = "mean"
@@ -175,7 +179,10 @@ class GPIS_OT_make(_Bake, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         obj = context.active_object
-        return obj is not None and obj.type == "MESH" and context.mode == "OBJECT"
+        if obj is None or obj.type != "MESH" or context.mode != "OBJECT":
+            cls.poll_message_set("Select a mesh, in object mode.")
+            return False
+        return True
 
     def execute(self, context):
         active = context.active_object

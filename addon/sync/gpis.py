@@ -97,11 +97,12 @@ def _grid(owner, what, name, grids, path):
 
 def _warn_if_cut(sync, owner, obj, sigma):
     margin = obj.gpis.bake_margin
-    if obj.gpis.source is not None and 0 < margin < _SAFE_DEVIATIONS * sigma:
-        sync.warn(
-            f"{owner}: σ = {sigma:.3g} reaches beyond the baked margin of {margin:.3g}, the surface is cut off at "
-            "the bounds. Bake again: the margin then follows σ."
-        )
+    if not 0 < margin < _SAFE_DEVIATIONS * sigma:
+        return
+    again = " Bake again: the margin then follows σ." if obj.gpis.source is not None else ""
+    sync.warn(
+        f"{owner}: σ = {sigma:.3g} reaches beyond the baked margin of {margin:.3g}, the surface is cut off at the bounds.{again}"
+    )
 
 
 def _list(grids):
