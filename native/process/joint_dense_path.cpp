@@ -6,6 +6,12 @@
 namespace gpis {
 namespace {
 
+// Values and slopes of a smooth process at points this close all but determine each other: without
+// noise of their own the rows drawn last follow from the ones before by weights of 1e4 and more,
+// and rounding made covariances of 1e3 σ² out of them over 7 length scales (leaving such rows out
+// costs 1e-3 where it is stable). The correlation is off by this much, the path stays a cubic.
+constexpr double kJitter = 1e-6;
+
 // |implied - exact correlation| of the cubics through values and slopes at points h apart from the
 // middle of one cell to that of another and to the points, at most.
 double error_of_cubics(const Covariance& covariance, const LineGeometry& line, double t, double h) {
@@ -83,8 +89,8 @@ void JointDensePath::draw(long index, Rng& rng, Counters& counters) {
   }
   if (rows_.active() > kMostRows) rows_.forget(lasting_rows_, kKept);
   const LocalPoint p = point(anchor_ + index * step_);
-  const double g = rows_.add_free(p, value_row(), rng, counters);
-  points_.push_back({index, g, rows_.add_free(p, slope_row(), rng, counters)});
+  const double g = rows_.add_free(p, value_row(), rng, counters, kJitter);
+  points_.push_back({index, g, rows_.add_free(p, slope_row(), rng, counters, kJitter)});
 }
 
 void JointDensePath::prepare(long cell, Rng& rng, Counters& counters) {

@@ -55,8 +55,8 @@ double JointRows::add_known(const LocalPoint& at, const Functional& what, double
 }
 
 double JointRows::add_free(const LocalPoint& at, const Functional& what, Rng& rng,
-                           Counters& counters) {
-  const double own = covariance_->between(at, what, at, what);
+                           Counters& counters, double jitter) {
+  const double own = (1 + jitter) * covariance_->between(at, what, at, what);
   double mean;
   const double pivot = border(at, what, own, mean);
   if (!(pivot > kDrawnPivot * own)) {
@@ -65,7 +65,7 @@ double JointRows::add_free(const LocalPoint& at, const Functional& what, Rng& rn
   }
   const double xi = rng.normal(), value = mean + std::sqrt(pivot) * xi;
   ++counters.line_normals;
-  append({at, what, value, 0, false}, pivot, xi);
+  append({at, what, value, own * jitter / (1 + jitter), false}, pivot, xi);
   return value;
 }
 

@@ -30,8 +30,10 @@ class JointRows {
   // standard deviations the value lies from what the rows before it say; 0 where it is left out.
   double add_known(const LocalPoint& at, const Functional& what, double value, double noise,
                    Counters& counters);
-  // A functional drawn given the rows before it; its value.
-  double add_free(const LocalPoint& at, const Functional& what, Rng& rng, Counters& counters);
+  // A functional drawn given the rows before it, with independent noise of `jitter` times its own
+  // variance; its value.
+  double add_free(const LocalPoint& at, const Functional& what, Rng& rng, Counters& counters,
+                  double jitter = 0);
   // From now on rows are drawn given the first `first` and the `last` rows alone.
   void forget(int first, int last);
 

@@ -57,6 +57,19 @@ def test_implied_correlation(field, kernel, full_size, seed):
     check_z(g.mean(axis=0), 0, 1 / np.sqrt(len(g)), "mean")
 
 
+def test_dense_lines_of_smooth_kernels(full_size, seed):
+    """Points so close, over so many length scales, that rounding once grew to a thousand deviations."""
+    n, kernel = 10_000 if full_size else 600, gn.LocallyPeriodic(0.3, 0.5, [0, 0.6, 0.8], 0.9)
+    gp = gn.GaussianProcess(5.0, 1, kernel, bounds=((-1, -1, -1), (1, 1, 1)))
+    direction, t = np.array([0.2, -0.3, -1.0]) / np.linalg.norm([0.2, -0.3, -1.0]), np.arange(0.02, 1.4, 0.15)
+    g = gn.line_values(gp, *along(n, direction, -direction), t, tolerance=1e-6, sampler="dense", seed=seed) - 5
+    g = g[np.isfinite(g).all(axis=1)]
+    assert len(g) > 0.99 * n
+    x = t[:, None] * direction
+    k = kernel(x, x)
+    check_z(g.T @ g / len(g), k, np.sqrt((1 + k**2) / len(g)) + 1e-4, "covariance")
+
+
 def test_implied_correlation_given_value_and_slope(full_size, seed):
     """A start with known value and gradient: the conditional law of the design (math.md §3), by numpy."""
     n, t = 20_000 if full_size else 4_000, np.array([0.02, 0.3, 0.9, 2.0])
@@ -116,9 +129,7 @@ def test_agrees_with_the_convolution_sampler(sampler, memory, full_size, seed):
     alone = gn.GaussianProcess(mean, 0.3, gn.SquaredExponential([0.8, 0.5, 0.5]), bounds=BOUNDS)
     field = along_x(lambda x: np.array([0.64, 0.25, 0.25, 0, 0, 0]), 8, 3)
     as_field = gn.GaussianProcess(mean, 0.3, KERNELS["se"], anisotropy=field, bounds=BOUNDS)
-    check_same_hits(
-        hits_twice(alone, n, "convolution", seed, memory), hits_twice(as_field, n, sampler, seed + 100, memory)
-    )
+    check_same_hits(hits_twice(alone, n, "convolution", seed, memory), hits_twice(as_field, n, sampler, seed + 100, memory))
 
 
 @pytest.mark.parametrize("field", ["length e^{x/4}", "rotating 3:1"])
