@@ -132,13 +132,6 @@ def test_agrees_with_the_convolution_sampler(sampler, memory, full_size, seed):
     check_same_hits(hits_twice(alone, n, "convolution", seed, memory), hits_twice(as_field, n, sampler, seed + 100, memory))
 
 
-@pytest.mark.parametrize("field", ["length e^{x/4}", "rotating 3:1"])
-def test_two_samplers_agree_where_lengths_vary(field, full_size, seed):
-    n = 10_000 if full_size else 2_000
-    gp = process(field, mean=gn.PlaneField([0, 0, 0], [0.1, 0, 1], 1), sigma=0.4)
-    check_same_hits(hits_twice(gp, n, "nystrom", seed), hits_twice(gp, n, "dense", seed + 100))
-
-
 @pytest.mark.parametrize("field", FIELDS)
 def test_first_hit_of_explicit_realisations(field, full_size, seed):
     """Jointly drawn at 300 points of the line, changes of sign found between them."""

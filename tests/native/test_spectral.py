@@ -6,7 +6,7 @@ import math
 import gpis_native as gn
 import numpy as np
 import pytest
-from statistics_checks import check_proportion, check_same_distribution, check_z
+from statistics_checks import check_proportion, check_z
 
 pytestmark = pytest.mark.stats
 BOUNDS = ((-4, -4, -4), (4, 4, 4))
@@ -145,20 +145,6 @@ def test_rate_and_gradients_of_crossings(name, level, n, seed):
     difference = np.maximum(np.abs(products.mean(axis=0) - expected) - 0.02 * scale, 0)
     check_z(difference, 0, products.std(axis=0) / math.sqrt(hit.sum()) + 1e-9 * scale.max(), "gradient")
     assert (hits["gradient"][hit] @ DIRECTION < 0).all()
-
-
-def test_against_convolution(n, seed):
-    """The same process by two samplers that share no code, from a remembered gradient, over a sloping mean."""
-    gp = gn.GaussianProcess(gn.PlaneField([0, 0, 0], [0.3, 0.2, 0.9], 0.5), 1, SE, bounds=BOUNDS)
-    state = {"value": np.zeros(n), "gradient": np.tile([0.6, -0.9, 1.4], (n, 1))}
-    found = {}
-    for i, sampler in enumerate(["spectral", "convolution"]):
-        found[sampler] = gn.first_hits(gp, *rays(n), 5, start=state, sampler=sampler, seed=seed + 7 * i)
-    a, b = found["spectral"], found["convolution"]
-    check_same_distribution(a["t"], b["t"], "t")
-    for i in range(3):
-        kept = [np.isfinite(x["t"]) for x in (a, b)]
-        check_same_distribution(a["gradient"][kept[0], i], b["gradient"][kept[1], i], f"gradient {i}")
 
 
 def test_counters():
