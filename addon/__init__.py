@@ -1,8 +1,8 @@
 """GPIS: a render engine for stochastic implicit surfaces (Seyb et al. 2024)."""
 
-from . import bake, engine, ui
+from . import bake, engine, presets, ui
 
-_PARTS = (ui, bake, engine)
+_PARTS = (ui, bake, presets, engine)
 
 
 def register():

@@ -5,6 +5,7 @@ import numpy as np
 
 from .. import statistics, volume
 from ..bake.operators import made_of
+from ..presets.table import PRESETS
 from .render_panels import ENGINE
 from .text import wrapped
 
@@ -30,6 +31,10 @@ class GPIS_PT_object(bpy.types.Panel):
         if context.object.type == "VOLUME":
             self.layout.prop(context.object.gpis, "enabled", text="")
 
+    def draw_header_preset(self, context):
+        if context.object.type == "VOLUME" and context.object.gpis.enabled:
+            self.layout.popover("GPIS_PT_presets", text="Presets", icon="PRESET")
+
     def draw(self, context):
         layout = self.layout
         layout.use_property_split = True
@@ -40,6 +45,21 @@ class GPIS_PT_object(bpy.types.Panel):
         layout.active = context.object.gpis.enabled
         _draw_fields(layout, context)
         _draw_kernel(layout, context)
+
+
+class GPIS_PT_presets(bpy.types.Panel):
+    """Settings and materials to begin with, scaled to the object"""
+
+    bl_label = "Presets"
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "HEADER"
+    bl_ui_units_x = 9
+
+    def draw(self, context):
+        layout = self.layout
+        choice = context.window_manager.gpis_preset
+        layout.template_icon_view(context.window_manager, "gpis_preset", show_labels=True, scale=7, scale_popup=5)
+        layout.operator("gpis.apply_preset", text=f"Apply {PRESETS[choice].label}").preset = choice
 
 
 class _VolumePanel:
@@ -182,7 +202,7 @@ def _length(context, value):
     return bpy.utils.units.to_string(units.system, "LENGTH", float(value) * units.scale_length, precision=3)
 
 
-_CLASSES = (GPIS_PT_object, GPIS_PT_anisotropy, GPIS_PT_paths, GPIS_PT_source)
+_CLASSES = (GPIS_PT_object, GPIS_PT_presets, GPIS_PT_anisotropy, GPIS_PT_paths, GPIS_PT_source)
 
 
 def register():
