@@ -32,9 +32,16 @@ PRESETS = {
         1.0,
         0.12,
     ),
-    "ROUGH_GOLD": Preset("Rough Gold", "Dents in a mirror: a wide, warm highlight", _settings(0.008, 0.06), (0.95, 0.62, 0.22), 1.0, 0.08),
+    "ROUGH_GOLD": Preset(
+        "Rough Gold", "Dents in a mirror: a wide, warm highlight", _settings(0.008, 0.06), (0.95, 0.62, 0.22), 1.0, 0.08
+    ),
     "SATIN_STEEL": Preset(
-        "Satin Steel", "Dents too fine to see: a soft, wide highlight", _settings(0.0012, 0.006), (0.62, 0.64, 0.67), 1.0, 0.1
+        "Satin Steel",
+        "Dents too fine to see: a soft, wide highlight",
+        _settings(0.0012, 0.006),
+        (0.62, 0.64, 0.67),
+        1.0,
+        0.1,
     ),
     "GROOVED_COPPER": Preset(
         "Grooved Copper",
@@ -56,7 +63,7 @@ PRESETS = {
     "FUR": Preset(
         "Fur",
         "Strands that stand along z",
-        _settings(0.05, 0.008, anisotropy="AXES", ratios=(1.0, 1.0, 14.0)),
+        _settings(0.03, 0.007, anisotropy="AXES", ratios=(1.0, 1.0, 12.0)),
         (0.34, 0.19, 0.085),
     ),
     "FELT": Preset("Felt", "A dense fuzz of short fibres", _settings(0.012, 0.006, "WONG"), (0.48, 0.035, 0.05)),
@@ -66,8 +73,8 @@ PRESETS = {
         _settings(0.05, 0.03, "RATIONAL_QUADRATIC", alpha=0.6),
         (0.9, 0.9, 0.88),
     ),
-    "CORAL": Preset("Coral", "Branches and caves", _settings(0.09, 0.035), (0.82, 0.28, 0.2)),
+    "CORAL": Preset("Coral", "Branches and caves", _settings(0.045, 0.03), (0.82, 0.28, 0.2)),
     "MIST": Preset(
-        "Mist", "Nearly a volume: light enters it deeply", _settings(0.16, 0.012, memory="RENEWAL"), (0.92, 0.93, 0.95)
+        "Mist", "Nearly a volume: light enters it deeply", _settings(0.06, 0.008, memory="RENEWAL"), (0.92, 0.93, 0.95)
     ),
 }
