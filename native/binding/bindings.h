@@ -9,6 +9,7 @@ namespace gpis {
 void bind_build_info(pybind11::module_& m);
 void bind_field(pybind11::module_& m);
 void bind_vdb(pybind11::module_& m);
+void bind_paint(pybind11::module_& m);
 void bind_kernel(pybind11::module_& m);
 void bind_process(pybind11::module_& m);
 void bind_realisation(pybind11::module_& m);

@@ -21,6 +21,7 @@ PYBIND11_MODULE(gpis_native, m) {
   gpis::bind_build_info(m);
   gpis::bind_field(m);
   gpis::bind_vdb(m);
+  gpis::bind_paint(m);
   gpis::bind_kernel(m);
   gpis::bind_process(m);
   gpis::bind_realisation(m);

@@ -1,0 +1,397 @@
+#include "field/painted_fields.h"
+
+#include <utility>
+
+#include "field/check.h"
+#include "field/painted_fields_impl.h"
+
+namespace gpis {
+namespace {
+
+// More nodes than this are not meant: a brush far off, a voxel too small.
+constexpr double kMostNodes = 1 << 28;
+
+void check_nodes(const openvdb::CoordBBox& box) {
+  const openvdb::Coord n = box.dim();
+  const double count = double(n.x()) * n.y() * n.z();
+  if (count > kMostNodes)
+    refuse("The grid would have ", n.x(), " x ", n.y(), " x ", n.z(), " nodes, at most ",
+           kMostNodes, " are kept: paint nearer to it, or with larger voxels.");
+}
+
+Vec3 mirrored(Vec3 p, int axis) {
+  p[axis] = -p[axis];
+  return p;
+}
+Vec3 mirrored_value(const Vec3& v, int) {
+  return v;  // a colour
+}
+double mirrored_value(double v, int) {
+  return v;
+}
+SymMat3 mirrored_value(SymMat3 a, int axis) {
+  if (axis != 2) a.xy = -a.xy;
+  if (axis != 1) a.xz = -a.xz;
+  if (axis != 0) a.yz = -a.yz;
+  return a;
+}
+
+// What is taken of another value: of a tensor the size or the shape alone.
+template <class Value>
+Value taken(Channel, const Value&, const Value& other) {
+  return other;
+}
+SymMat3 taken(Channel channel, const SymMat3& own, const SymMat3& other) {
+  const double ratio = length_scale_of(other) / length_scale_of(own);
+  return channel == Channel::length_scale ? own * (ratio * ratio) : other * (1 / (ratio * ratio));
+}
+
+// Calls `visit` with the layer of a channel.
+template <class Layers, class Visit>
+auto with_layer(Layers& layers, Channel channel, const Visit& visit) {
+  switch (channel) {
+    case Channel::mean:
+      return visit(layers.mean);
+    case Channel::deviation:
+      return visit(layers.sigma);
+    case Channel::albedo:
+      return visit(layers.albedo);
+    default:
+      return visit(layers.anisotropy);
+  }
+}
+
+template <class Kind>
+std::vector<openvdb::Coord> leaves_of(const typename Kind::Grid& grid) {
+  std::vector<openvdb::Coord> out;
+  for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) out.push_back(leaf->origin());
+  return out;
+}
+
+template <class Kind>
+const Layer<Kind>& layer_of(const PaintLayers& layers, Channel channel) {
+  if constexpr (std::is_same_v<Kind, ScalarLayer>)
+    return channel == Channel::mean ? layers.mean : layers.sigma;
+  else if constexpr (std::is_same_v<Kind, ColorLayer>)
+    return layers.albedo;
+  else
+    return layers.anisotropy;
+}
+
+// The value of a layer at any point, without its grids the constant.
+template <class Kind>
+typename Kind::Value constant_of(const PaintLayers& layers);
+template <>
+double constant_of<ScalarLayer>(const PaintLayers& layers) {
+  return layers.constant_sigma;
+}
+template <>
+Vec3 constant_of<ColorLayer>(const PaintLayers&) {
+  return {1, 1, 1};
+}
+template <>
+SymMat3 constant_of<TensorLayer>(const PaintLayers& layers) {
+  return SymMat3::identity(layers.constant_length * layers.constant_length);
+}
+
+}  // namespace
+
+PaintedFields::PaintedFields(const PaintSource& source) : impl_(std::make_unique<Impl>()) {
+  impl_->open(source);
+}
+PaintedFields::~PaintedFields() = default;
+
+void PaintedFields::Impl::make(Channel channel) {
+  if (channel == Channel::deviation && !layers.sigma) make_sigma(layers, layers.constant_sigma);
+  if ((channel == Channel::length_scale || channel == Channel::anisotropy) && !layers.anisotropy)
+    make_anisotropy(layers, constant_of<TensorLayer>(layers));
+  if (channel == Channel::albedo && !layers.albedo) make_albedo(layers);
+}
+
+PaintCounts PaintedFields::apply(const Brush& brush, const std::vector<Dab>& dabs) {
+  check_brush(brush);
+  check_dabs(brush, dabs);
+  impl_->make(brush.channel);
+  const auto paint = brush.channel == Channel::mean        ? paint_mean
+                     : brush.channel == Channel::deviation ? paint_deviation
+                     : brush.channel == Channel::albedo    ? paint_albedo
+                                                           : paint_tensor;
+  PaintCounts counts;
+  for (const Dab& dab : dabs)
+    counts.add(paint(impl_->layers, brush, DabImages(dab, brush.symmetry)));
+  return counts;
+}
+
+void PaintedFields::extend(const Box3& bounds) {
+  check_finite("bounds", bounds.min);
+  check_finite("bounds", bounds.max);
+  if (bounds.empty()) refuse("bounds go from ", bounds.min, " to ", bounds.max, ", backwards.");
+  PaintLayers& old = impl_->layers;
+  openvdb::CoordBBox box = old.box;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3 p = old.to_index.point({(corner & 1 ? bounds.max : bounds.min).x,
+                                       (corner & 2 ? bounds.max : bounds.min).y,
+                                       (corner & 4 ? bounds.max : bounds.min).z});
+    for (int i = 0; i < 3; ++i) {
+      const double low = std::clamp(p[i], -1e8, 1e8);
+      // Whole leaves, and only on the sides that grow.
+      if (low < box.min()[i]) box.min()[i] = static_cast<int>(std::floor(low)) & ~7;
+      if (low > box.max()[i]) box.max()[i] = static_cast<int>(std::ceil(low)) | 7;
+    }
+  }
+  if (box == old.box) return;
+  check_nodes(box);
+  std::vector<openvdb::Coord> leaves;
+  for (const openvdb::Coord& c : leaves_of_box(box))
+    if (!old.box.isInside(openvdb::CoordBBox(c, c.offsetBy(7)))) leaves.push_back(c);
+  PaintLayers larger = old;
+  larger.box = box;
+  larger.visit([&](const auto& layer, const auto&) {
+    using Kind = typename std::decay_t<decltype(layer)>::Kind;
+    rewrite<Kind>(
+        larger, layer, leaves,
+        [&] {
+          return [&, read = LayerReader<Kind>(layer.grid, old.box)](
+                     const openvdb::Coord& c, const Vec3& x, const typename Kind::Value&,
+                     PaintCounts&) -> std::optional<typename Kind::Value> {
+            if (old.box.isInside(c)) return std::nullopt;
+            const openvdb::Coord nearest = clamped(c, old.box);
+            const auto value = read.at(nearest);
+            if constexpr (std::is_same_v<Kind, ScalarLayer>) {
+              if (&layer == &larger.mean) {
+                const double rise =
+                    dot(old.gradient_to_object * read.difference(nearest), x - old.point(nearest));
+                // Outside stays outside.
+                return value + (value > 0 ? std::max(rise, 0.0) : rise);
+              }
+            }
+            return value;
+          };
+        },
+        Rewrite::extend);
+    mark_box(larger, layer);
+  });
+  old = larger;
+}
+
+PaintCounts PaintedFields::reset(Channel channel) {
+  impl_->make(channel);
+  const PaintLayers& layers = impl_->layers;
+  return with_layer(layers, channel, [&](const auto& layer) {
+    using Kind = typename std::decay_t<decltype(layer)>::Kind;
+    const auto leaves = leaves_of<Kind>(*layer.base[0]);
+    return rewrite<Kind>(layers, layer, leaves, [&] {
+      return [&, base = LayerReader<Kind>(layer.base, layers.box)](
+                 const openvdb::Coord& c, const Vec3&, const typename Kind::Value& old,
+                 PaintCounts&) -> std::optional<typename Kind::Value> {
+        return taken(channel, old, base.at(c));
+      };
+    });
+  });
+}
+
+PaintCounts PaintedFields::mirror(Channel channel, int axis, bool from_positive) {
+  if (axis < 0 || axis > 2) refuse("axis is ", axis, "; it takes 0, 1 or 2.");
+  impl_->make(channel);
+  Box3 box = bounds();
+  const Vec3 low = mirrored(box.min, axis), high = mirrored(box.max, axis);
+  box.include(low);
+  box.include(high);
+  extend(box);
+  const PaintLayers& layers = impl_->layers;
+  return with_layer(layers, channel, [&](const auto& layer) {
+    using Kind = typename std::decay_t<decltype(layer)>::Kind;
+    return rewrite<Kind>(layers, layer, leaves_of_box(layers.box), [&] {
+      return [&, read = LayerReader<Kind>(layer.grid, layers.box)](
+                 const openvdb::Coord&, const Vec3& x, const typename Kind::Value& old,
+                 PaintCounts&) -> std::optional<typename Kind::Value> {
+        if (from_positive ? !(x[axis] < 0) : !(x[axis] > 0)) return std::nullopt;
+        const auto image = read.sample(layers.to_index.point(mirrored(x, axis)));
+        return taken(channel, old, mirrored_value(image, axis));
+      };
+    });
+  });
+}
+
+PaintCounts PaintedFields::copy(const PaintedFields& other, Channel channel) {
+  impl_->make(channel);
+  PaintLayers& layers = impl_->layers;
+  const PaintLayers& from = other.impl_->layers;
+  return with_layer(layers, channel, [&](auto& layer) {
+    using Kind = typename std::decay_t<decltype(layer)>::Kind;
+    const Layer<Kind>& source = layer_of<Kind>(from, channel);
+    const PaintCounts counts = rewrite<Kind>(layers, layer, leaves_of_box(layers.box), [&] {
+      std::optional<LayerReader<Kind>> read;
+      if (source) read.emplace(source.grid, from.box);
+      return [&, read](const openvdb::Coord&, const Vec3& x, const typename Kind::Value& old,
+                       PaintCounts&) -> std::optional<typename Kind::Value> {
+        const auto value = read ? read->sample(from.to_index.point(x)) : constant_of<Kind>(from);
+        return taken(channel, old, value);
+      };
+    });
+    forget_base(layers, layer);
+    return counts;
+  });
+}
+
+void PaintedFields::restart() {
+  PaintLayers& layers = impl_->layers;
+  layers.box = layers.base_box;
+  layers.visit([&](const auto& layer, const auto&) {
+    using L = std::decay_t<decltype(layer)>;
+    for (int k = 0; k < L::Kind::K; ++k) {
+      auto& tree = layer.grid[k]->tree();
+      for (auto leaf = layer.base[k]->tree().cbeginLeaf(); leaf; ++leaf)
+        tree.addLeaf(new typename L::Leaf(*leaf));
+      layer.base[k]->tree().clear();
+      tree.clip(layers.box);
+      tree.prune();
+    }
+    mark_box(layers, layer);
+  });
+}
+
+void PaintedFields::resample(double voxel_size) {
+  check_positive("voxel_size", voxel_size);
+  const PaintLayers old = impl_->layers;
+  const Vec3 edges = this->voxel_size();
+  for (int i = 0; i < 3; ++i)
+    if (std::abs(std::abs(old.to_object.linear.row[i][i]) - edges[i]) > 1e-6 * edges[i])
+      refuse("The grid is rotated or sheared in its file; only one along the axes is resampled.");
+  const Box3 bounds = this->bounds();
+  PaintLayers next = old;
+  next.transform = openvdb::math::Transform::createLinearTransform(voxel_size);
+  next.transform->postTranslate(openvdb::Vec3d(bounds.min.x, bounds.min.y, bounds.min.z));
+  next.to_object = {Mat3{} * voxel_size, bounds.min};
+  next.to_index = inverse(next.to_object);
+  next.gradient_to_object = transpose(next.to_index.linear);
+  openvdb::Coord last;
+  for (int i = 0; i < 3; ++i) {
+    // A box that is a whole number of voxels but for rounding is not one more.
+    const double cells = std::ceil((bounds.max[i] - bounds.min[i]) / voxel_size - 1e-6);
+    if (!(cells >= 1 && cells < 1e5))
+      refuse("voxel_size is ", voxel_size, "; the grid goes from ", bounds.min, " to ", bounds.max,
+             ".");
+    last[i] = static_cast<int>(cells);
+  }
+  next.box = next.base_box = {openvdb::Coord(0, 0, 0), last};
+  check_nodes(next.box);
+
+  const auto leaves = leaves_of_box(next.box);
+  const auto transfer = [&](const auto& from, auto& to) {
+    using Kind = typename std::decay_t<decltype(from)>::Kind;
+    if (!from) return;
+    for (int k = 0; k < Kind::K; ++k)
+      to.grid[k] =
+          make_grid<typename Kind::Grid>(next, from.grid[k]->background(), from.grid[k]->getName());
+    forget_base(next, to);
+    rewrite<Kind>(next, to, leaves, [&] {
+      return [&, read = LayerReader<Kind>(from.grid, old.box)](
+                 const openvdb::Coord&, const Vec3& x, const typename Kind::Value&, PaintCounts&) {
+        return std::optional<typename Kind::Value>(read.sample(old.to_index.point(x)));
+      };
+    });
+    forget_base(next, to);
+    mark_box(next, to);
+  };
+  transfer(old.mean, next.mean);
+  transfer(old.sigma, next.sigma);
+  transfer(old.anisotropy, next.anisotropy);
+  transfer(old.albedo, next.albedo);
+  impl_->layers = next;
+}
+
+Box3 PaintedFields::bounds() const {
+  const PaintLayers& layers = impl_->layers;
+  Box3 bounds;
+  for (int corner = 0; corner < 8; ++corner)
+    bounds.include(layers.point({(corner & 1 ? layers.box.max() : layers.box.min()).x(),
+                                 (corner & 2 ? layers.box.max() : layers.box.min()).y(),
+                                 (corner & 4 ? layers.box.max() : layers.box.min()).z()}));
+  return bounds;
+}
+
+Vec3 PaintedFields::voxel_size() const {
+  const Mat3 axes = transpose(impl_->layers.to_object.linear);
+  return {length(axes.row[0]), length(axes.row[1]), length(axes.row[2])};
+}
+
+std::int64_t PaintedFields::memory() const {
+  std::int64_t bytes = 0;
+  impl_->layers.visit([&](const auto& layer, const auto&) {
+    for (std::size_t k = 0; k < layer.grid.size(); ++k)
+      bytes += layer.grid[k]->memUsage() + layer.base[k]->memUsage();
+  });
+  return bytes;
+}
+
+std::vector<std::string> PaintedFields::painted() const {
+  std::vector<std::string> names;
+  impl_->layers.visit([&](const auto& layer, const auto& own) {
+    if (static_cast<const void*>(&layer) != &impl_->layers.mean)
+      names.insert(names.end(), own.begin(), own.end());
+  });
+  return names;
+}
+
+std::vector<double> PaintedFields::values(Channel channel, const std::vector<Vec3>& points) const {
+  const PaintLayers& layers = impl_->layers;
+  std::vector<double> out;
+  with_layer(layers, channel, [&](const auto& layer) {
+    using Kind = typename std::decay_t<decltype(layer)>::Kind;
+    std::optional<LayerReader<Kind>> read;
+    if (layer) read.emplace(layer.grid, layers.box);
+    for (const Vec3& p : points) {
+      const auto v = read ? read->sample(layers.to_index.point(p)) : constant_of<Kind>(layers);
+      if constexpr (std::is_same_v<Kind, ScalarLayer>)
+        out.push_back(v);
+      else if constexpr (std::is_same_v<Kind, ColorLayer>)
+        out.insert(out.end(), {v.x, v.y, v.z});
+      else if (channel == Channel::length_scale)
+        out.push_back(length_scale_of(v));
+      else
+        out.insert(out.end(), {v.xx, v.yy, v.zz, v.xy, v.xz, v.yz});
+    }
+  });
+  return out;
+}
+
+std::pair<double, Vec3> PaintedFields::first_surface(const Vec3& origin, const Vec3& direction,
+                                                     double t_max) const {
+  check_finite("origin", origin);
+  check_direction("direction", direction);
+  const PaintLayers& layers = impl_->layers;
+  const auto mean = layers.mean_reader();
+  const Vec3 o = layers.to_index.point(origin), d = layers.to_index.vector(direction);
+  Box3 box;
+  for (const openvdb::Coord& c : {layers.box.min(), layers.box.max()})
+    box.include({double(c.x()), double(c.y()), double(c.z())});
+  const auto [enter, leave] = clip(box, o, d, 0, t_max);
+  const double step = 0.5 / length(d);
+  double before = enter;
+  bool outside = false;
+  for (double t = enter; t <= leave; t += step) {
+    const bool above = mean.sample(o + d * t) > 0;
+    if (above || !outside) {
+      outside = above;
+      before = t;
+      continue;
+    }
+    double low = before, high = t;
+    for (int i = 0; i < 40; ++i) {
+      const double middle = (low + high) / 2;
+      (mean.sample(o + d * middle) > 0 ? low : high) = middle;
+    }
+    const Vec3 x = o + d * high;
+    Vec3 slope;
+    for (int i = 0; i < 3; ++i) {
+      Vec3 half;
+      half[i] = 0.5;
+      slope[i] = mean.sample(x + half) - mean.sample(x - half);
+    }
+    return {high, layers.gradient_to_object * slope};
+  }
+  return {kInfinity, Vec3{}};
+}
+
+}  // namespace gpis
