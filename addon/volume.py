@@ -12,6 +12,8 @@ from .native import native
 # Grids of A(x), the squared length scales: (xx, yy, zz) and (xy, xz, yz).
 ANISOTROPY_GRIDS = ("anisotropy_diagonal", "anisotropy_offdiagonal")
 
+_BASE_PREFIX = "gpis_base_"
+
 # (path, time of change, size) -> list of grids: panels ask at every redraw.
 _grids = {}
 
@@ -53,8 +55,17 @@ def _all_grids(path):
 
 
 def grids(path):
-    """The scalar grids of a .vdb that hold anything, as the native `vdb_grids` describes them."""
-    return [grid for grid in _all_grids(path) if grid["type"] in {"float", "double"}]
+    """The scalar grids of a .vdb that hold anything, as the native `vdb_grids` describes them; without what a painted
+    file keeps of them to go back to."""
+    return [
+        grid
+        for grid in _all_grids(path)
+        if grid["type"] in {"float", "double"} and not grid["name"].startswith(_BASE_PREFIX)
+    ]
+
+
+def all_grid_names(path):
+    return [grid["name"] for grid in _all_grids(path)]
 
 
 def vector_grid_names(path):

@@ -19,6 +19,8 @@ from ..volume import unpacked
 _VERSIONED = re.compile(r"^(?P<name>.+)\.v(?P<version>\d{4,})\.vdb$")
 # Versions of a name that stay although nothing uses them, beside those of the backups.
 _KEPT = 2
+# Blender's ID_VO, the letters of its file format.
+_VOLUME_CODE = int.from_bytes(b"VO", "little")
 # Files made or used since the last load: undo may bring any of them back.
 _session = set()
 # (volume, its former file) of the save in hand.
@@ -42,8 +44,22 @@ def new_path(name):
 
 def point(data, path):
     """Give a volume a file that was written for it."""
+    if data.packed_file:  # the old bytes, which Blender would otherwise keep
+        bpy.ops.file.unpack_item(id_name=data.name, id_type=_VOLUME_CODE, method="USE_ORIGINAL")
     data.filepath = bpy.path.relpath(str(path)) if bpy.data.filepath else str(path)
     data.gpis_baked = True
+
+
+def name_of(path):
+    """What a .vdb is called, without its version."""
+    match = _VERSIONED.match(Path(path).name)
+    return match["name"] if match else Path(path).stem
+
+
+def versions_of(path):
+    """The files beside a path that are versions of the same name, the newest last."""
+    path = Path(path)
+    return [found for name, _, found in sorted(_versions(path.parent)) if name == name_of(path)]
 
 
 def _next(place, name):
@@ -107,6 +123,8 @@ def collect():
     """Delete versions that nothing can point at any more. A backup that was opened collects nothing."""
     if not bpy.data.filepath.endswith(".blend"):
         return
+    for partial in folder(bpy.data.filepath).glob("*.vdb.part"):
+        partial.unlink()  # a bake that was killed
     backups = _times_of_backups()
     used = {path for _, path in _baked()} | _session
     versions = {}

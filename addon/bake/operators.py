@@ -5,6 +5,7 @@ import numpy as np
 from bpy.props import FloatProperty, IntProperty
 
 from ..native import native
+from ..paint import bake as painting
 from ..sync import meshes
 from . import files
 
@@ -14,8 +15,6 @@ DEFAULT_LENGTH_SCALE = 0.1
 # The margin around the mesh, unless it is given: the surface at 4 σ is met once in 30,000 realisations.
 _MARGIN_SIGMAS = 4.0
 _LEAST_MARGIN = 0.1
-# Blender's ID_VO, the letters of its file format.
-_VOLUME_CODE = int.from_bytes(b"VO", "little")
 
 
 def automatic_margin(sigma, size):
@@ -66,12 +65,11 @@ def bake(context, volume_object, *, resolution, margin):
     # Blender's Duplicate shares the data; a bake of another mesh is data of its own.
     if any(other.data == data and other.gpis.source != source for other in bpy.data.objects):
         data = volume_object.data = data.copy()
-    if data.packed_file:  # the old bytes, which Blender would otherwise keep
-        bpy.ops.file.unpack_item(id_name=data.name, id_type=_VOLUME_CODE, method="USE_ORIGINAL")
     files.point(data, path)
     settings.bake_resolution = resolution
     settings.bake_margin = margin
     settings.mean_grid = "mean"
+    painting.rebase(volume_object)
     return report
 
 

@@ -8,6 +8,7 @@ import bpy
 from bpy.props import (
     BoolProperty,
     BoolVectorProperty,
+    CollectionProperty,
     EnumProperty,
     FloatProperty,
     FloatVectorProperty,
@@ -104,6 +105,34 @@ def _on_enabled(settings, context):
 def _grid_names(settings, context, edit_text):
     data = settings.id_data.data
     return volume.grid_names(data) if isinstance(data, bpy.types.Volume) else []
+
+
+class GPIS_ConditionPoint(bpy.types.PropertyGroup):
+    """A place that every realisation of the surface goes through."""
+
+    location: FloatVectorProperty(name="Location", description="In object space", size=3, subtype="XYZ", update=_tag)
+    normal: FloatVectorProperty(
+        name="Normal", description="Of the surface there, in object space", size=3, subtype="XYZ", default=(0, 0, 1), update=_tag
+    )
+    slope: FloatProperty(
+        name="Slope",
+        description="How steeply the process rises along the normal; 1 for a distance",
+        default=1.0,
+        min=1e-6,
+        soft_max=10.0,
+        precision=3,
+        update=_tag,
+    )
+    noise: FloatProperty(
+        name="Noise",
+        description="How far the surface may still be from this point, as a standard deviation in object units",
+        default=0.0,
+        min=0.0,
+        soft_max=1.0,
+        precision=4,
+        subtype="DISTANCE",
+        update=_tag,
+    )
 
 
 class GPIS_ObjectProperties(bpy.types.PropertyGroup):
@@ -261,6 +290,17 @@ class GPIS_ObjectProperties(bpy.types.PropertyGroup):
         soft_max=10.0,
         precision=3,
         update=_tag,
+    )
+    use_albedo: BoolProperty(
+        name="Albedo Grid",
+        description="Multiply the material's base colour by the grid albedo of the file",
+        default=False,
+        update=_tag,
+    )
+    conditions: CollectionProperty(
+        name="Condition Points",
+        description="Places that every realisation of the surface goes through",
+        type=GPIS_ConditionPoint,
     )
     memory: EnumProperty(
         name="Memory",

@@ -3,7 +3,7 @@
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty
 
-from .object_properties import GPIS_ObjectProperties
+from .object_properties import GPIS_ConditionPoint, GPIS_ObjectProperties
 
 
 class GPIS_SceneProperties(bpy.types.PropertyGroup):
@@ -92,6 +92,7 @@ _GROUPS = (
 
 
 def register():
+    bpy.utils.register_class(GPIS_ConditionPoint)
     for owner, group in _GROUPS:
         bpy.utils.register_class(group)
         owner.gpis = PointerProperty(type=group)
@@ -105,3 +106,4 @@ def unregister():
     for owner, group in reversed(_GROUPS):
         del owner.gpis
         bpy.utils.unregister_class(group)
+    bpy.utils.unregister_class(GPIS_ConditionPoint)

@@ -1,0 +1,35 @@
+"""Painting on GPIS objects.
+
+brush = stroke.Brush("deviation", "set", value=0.2, symmetry=(True, False, False))
+spacing = stroke.Spacing(radius=0.3, strength=0.5)             # points of a hand -> dabs, in object space
+painting = bake.Painting(obj, brush)
+painting.add(spacing.add(location, pressure))                  # as often as the hand moves; painting.fields is live
+painting.add(spacing.finish()); painting.finish()              # or painting.cancel()
+bake.fields(obj).first_surface(origin, direction)              # what is under the cursor
+conditions.pin(obj, [location]); conditions.erase(obj, [location], radius)
+"""
+
+import bpy
+from bpy.app.handlers import persistent
+
+from . import bake, operators
+
+
+@persistent
+def _after_load(*_):
+    bake.forget()
+
+
+def register():
+    bpy.types.Volume.gpis_strokes = bpy.props.StringProperty(
+        name="Strokes", description="What was painted, as data: addon/paint/stroke.py", options={"HIDDEN"}
+    )
+    operators.register()
+    bpy.app.handlers.load_post.append(_after_load)
+
+
+def unregister():
+    bpy.app.handlers.load_post.remove(_after_load)
+    operators.unregister()
+    bake.forget()
+    del bpy.types.Volume.gpis_strokes
