@@ -1,5 +1,6 @@
 #include "binding/arguments.h"
 
+#include <charconv>
 #include <filesystem>
 
 #include "binding/reader.h"
@@ -22,8 +23,14 @@ Memory memory_argument(const std::string& value, const std::string& name) {
   if (value == "renewal") return Memory::renewal;
   if (value == "renewal+") return Memory::renewal_plus;
   if (value == "global") return Memory::global;
+  int count = 0;
+  const char *first = value.data() + 7, *last = value.data() + value.size();
+  if (value.starts_with("global-") && std::from_chars(first, last, count).ptr == last &&
+      count >= 1 && count <= Memory::kMostSegments)
+    return {Memory::segments, count};
   throw std::invalid_argument(name + " is '" + value +
-                              "', it takes 'none', 'renewal', 'renewal+' or 'global'.");
+                              "', it takes 'none', 'renewal', 'renewal+', 'global-1' to 'global-" +
+                              std::to_string(Memory::kMostSegments) + "' or 'global'.");
 }
 
 TreePtr tree_argument(const py::handle& value, const std::string& name) {

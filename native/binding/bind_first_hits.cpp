@@ -72,7 +72,7 @@ void bind_first_hits(py::module_& m) {
       "origins, directions (N, 3), unit length. start: None (rays come from outside) or "
       "dict(value (N,), gradient (N, 3)):\n"
       "rays leave a point where f = value (0 on the surface), remembered as `memory` says "
-      "('none', 'renewal', 'renewal+', 'global').\n"
+      "('none', 'renewal', 'renewal+', 'global-n' for n segments, 'global').\n"
       "inside: (N,) bool, rays that travel inside the body: their first change of sign to "
       "outside.\n"
       "sampler: 'auto', 'convolution', 'markov', 'spectral', 'nystrom', 'dense' or 'realisation'. "

@@ -7,8 +7,9 @@
 
 #include "binding/arguments.h"
 #include "binding/bindings.h"
+#include "binding/conditions_argument.h"
 #include "process/at_points.h"
-#include "process/covariance.h"
+#include "process/posterior.h"
 #include "process/surface.h"
 
 namespace gpis {
@@ -52,6 +53,18 @@ Array sample(const GaussianProcess& gp, const py::object& at, py::ssize_t n, std
   return to_array(sample_at(gp, x, n, seed));
 }
 
+py::tuple posterior(const GaussianProcess& gp, const py::object& at) {
+  const auto x = points_argument(at, "x");
+  const auto laws = posterior_at(gp, x);
+  const auto n = static_cast<py::ssize_t>(x.size());
+  Array mean(n), variance(n);
+  for (py::ssize_t i = 0; i < n; ++i) {
+    mean.mutable_at(i) = laws[i].mean;
+    variance.mutable_at(i) = laws[i].variance;
+  }
+  return py::make_tuple(mean, variance);
+}
+
 // Now, in temporal length scales.
 std::optional<double> time_argument(std::optional<double> time_scale, double time) {
   if (!std::isfinite(time))
@@ -82,10 +95,15 @@ void bind_process(py::module_& m) {
       "on a grid bounds the\n"
       "process to its nodes. time_scale, time: g also depends on time, with the correlation "
       "exp(-Δ²/2) over Δ time\n"
-      "scales: realisations of the same seed flow from frame to frame (None: they stand still).")
+      "scales: realisations of the same seed flow from frame to frame (None: they stand still).\n"
+      "conditions: what is known of f, a dict of points (C, 3), values (C,), normals (C, 3) (NaN = "
+      "none), slopes (C,),\n"
+      "the length of the gradient along the normal (1), noise (C,), standard deviation of the "
+      "value "
+      "(0).")
       .def(py::init([](const py::object& mean, const py::object& sigma, const py::object& kernel,
-                       const py::object& anisotropy, const py::object& bounds,
-                       std::optional<double> time_scale, double time) {
+                       const py::object& anisotropy, const py::object& conditions,
+                       const py::object& bounds, std::optional<double> time_scale, double time) {
              auto gp = std::make_shared<GaussianProcess>();
              gp->mean = field_argument(mean, "mean");
              gp->sigma = field_argument(sigma, "sigma");
@@ -104,6 +122,8 @@ void bind_process(py::module_& m) {
                  if (!(corners[0][i] < corners[1][i]))
                    throw std::invalid_argument("bounds: min must be below max on every axis.");
              }
+             gp->conditions = conditions_argument(conditions);
+             if (gp->conditions) const Posterior checks_conditions(*gp);
              gp->time = time_argument(time_scale, time);
              if (gp->sigma->range().min < 0)
                throw std::invalid_argument("sigma must not be negative, it goes down to " +
@@ -113,7 +133,8 @@ void bind_process(py::module_& m) {
              return gp;
            }),
            "mean"_a, "sigma"_a, "kernel"_a, py::kw_only(), "anisotropy"_a = py::none(),
-           "bounds"_a = py::none(), "time_scale"_a = py::none(), "time"_a = 0.0)
+           "conditions"_a = py::none(), "bounds"_a = py::none(), "time_scale"_a = py::none(),
+           "time"_a = 0.0)
       .def(
           "mean",
           [](const GaussianProcess& gp, const py::object& x) {
@@ -134,7 +155,9 @@ void bind_process(py::module_& m) {
            "Covariance of g and its gradient (g, ∇g) between points x (N, 3) and y (M, 3): "
            "(N, M, 4, 4). Without sigma.")
       .def("sample", &sample, "points"_a, "n"_a, "seed"_a = 0,
-           "n joint samples of f at points (N, 3), N up to 4096: (n, N).")
+           "n joint samples of f at points (N, 3), N up to 4096, given the conditions: (n, N).")
+      .def("posterior", &posterior, "x"_a,
+           "Mean and variance of f at points x (N, 3), given the conditions: ((N,), (N,)).")
       .def(
           "plan",
           [](const std::shared_ptr<GaussianProcess>& gp) {

@@ -95,7 +95,7 @@ width, height: pixels. At least one of these says when to stop; whichever is rea
 first_sample: number of the first sample, a multiple of 16: a slice of a longer render, see merge
 seed: random streams depend on (seed, pixel, sample) only, so the image is the same bit by bit whatever `threads`
 threads: 0 = all cores
-memory: "none" | "renewal" | "renewal+" | "global" in place of what the objects say
+memory: "none" | "renewal" | "renewal+" | "global-1" … "global-64" | "global" in place of what the objects say
 progress: called as progress(fraction, stats) from the calling thread at most about ten times a second; stats holds seconds,
     samples (per pixel, mean), estimated_error (after the last round), remaining (estimated seconds; inf while unknown) and
     error_left (the square root of estimated_error, less noise_threshold if there is one). Returning False cancels: the result

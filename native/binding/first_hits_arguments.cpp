@@ -63,7 +63,7 @@ std::vector<RealisationMemory> realisations_argument(const py::handle& argument,
     out[i].seed = seed.data()[i];
     const double* at = entry.data() + 3 * i;
     if (std::isfinite(shift.data()[i]))
-      out[i].entry = {true, {at[0], at[1], at[2]}, {shift.data()[i], {}}};
+      out[i].entry = {true, {at[0], at[1], at[2]}, {shift.data()[i], {}}, -1, {}};
   }
   return out;
 }
@@ -84,6 +84,69 @@ py::dict realisations_dict(const std::vector<RealisationMemory>& realisations, p
       entry.mutable_data()[3 * i + k] = r.entry.active ? r.entry.at[k] : kNan;
   }
   return py::dict("seed"_a = seed, "entry"_a = entry, "shift"_a = shift);
+}
+
+// What rows have kept of their last segments, memory `global-n`: the functionals value·g + slope·∇g
+// that are known, one after the other: row (M,), of a tree row · leaves + leaf, segment (M,), the
+// oldest 0, position (M, 3), functional (M, 4), value (M,) and variance of its noise (M,).
+std::vector<SegmentMemory> segments_argument(const py::handle& argument, std::size_t count) {
+  constexpr const char* sentence =
+      "start['segments'] must be a dict of row (M,), segment (M,), position (M, 3), functional (M, "
+      "4), value (M,) and noise (M,), as in the state of earlier hits.";
+  if (!py::isinstance<py::dict>(argument)) throw std::invalid_argument(sentence);
+  const auto dict = py::reinterpret_borrow<py::dict>(argument);
+  for (const char* key : {"row", "segment", "position", "functional", "value", "noise"})
+    if (!dict.contains(key) || py::len(dict) != 6) throw std::invalid_argument(sentence);
+  using Indices = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
+  const Indices row = Indices::ensure(dict["row"]), segment = Indices::ensure(dict["segment"]);
+  const Array position = Array::ensure(dict["position"]),
+              functional = Array::ensure(dict["functional"]), value = Array::ensure(dict["value"]),
+              noise = Array::ensure(dict["noise"]);
+  if (!row || !segment || !position || !functional || !value || segment.size() != row.size() ||
+      position.size() != 3 * row.size() || functional.size() != 4 * row.size() ||
+      value.size() != row.size() || !noise || noise.size() != row.size()) {
+    PyErr_Clear();
+    throw std::invalid_argument(sentence);
+  }
+  std::vector<SegmentMemory> out(count);
+  for (py::ssize_t i = 0; i < row.size(); ++i) {
+    const double *p = position.data() + 3 * i, *f = functional.data() + 4 * i;
+    const std::int64_t of = row.data()[i], number = segment.data()[i];
+    if (of < 0 || of >= static_cast<std::int64_t>(count) || number < 0 ||
+        number >= Memory::kMostSegments || !is_finite(Vec3{p[0], p[1], p[2]}) ||
+        !is_finite(Vec3{f[1], f[2], f[3]}) || !std::isfinite(f[0] + value.data()[i]) ||
+        !(noise.data()[i] >= 0 && noise.data()[i] < 1))
+      throw std::invalid_argument(sentence);
+    auto& segments = out[of].segments;
+    if (number >= static_cast<std::int64_t>(segments.size())) segments.resize(number + 1);
+    segments[number].push_back(
+        {{p[0], p[1], p[2]}, {f[0], {f[1], f[2], f[3]}}, value.data()[i], noise.data()[i]});
+  }
+  return out;
+}
+
+py::dict segments_dict(const std::vector<SegmentMemory>& kept) {
+  std::vector<std::int64_t> row, segment;
+  std::vector<double> position, functional, value, noise;
+  for (std::size_t i = 0; i < kept.size(); ++i)
+    for (std::size_t s = 0; s < kept[i].segments.size(); ++s)
+      for (const SegmentMemory::Row& r : kept[i].segments[s]) {
+        row.push_back(static_cast<std::int64_t>(i));
+        segment.push_back(static_cast<std::int64_t>(s));
+        for (int k = 0; k < 3; ++k) position.push_back(r.at[k]);
+        functional.push_back(r.what.value);
+        for (int k = 0; k < 3; ++k) functional.push_back(r.what.slope[k]);
+        value.push_back(r.value);
+        noise.push_back(r.noise);
+      }
+  const auto m = static_cast<py::ssize_t>(row.size());
+  const auto array = [](const auto& v, std::vector<py::ssize_t> shape) {
+    return py::array_t<typename std::decay_t<decltype(v)>::value_type>(shape, v.data());
+  };
+  return py::dict("row"_a = array(row, {m}), "segment"_a = array(segment, {m}),
+                  "position"_a = array(position, {m, 3}),
+                  "functional"_a = array(functional, {m, 4}), "value"_a = array(value, {m}),
+                  "noise"_a = array(noise, {m}));
 }
 
 // value (N,) and gradient (N, 3); of a tree (N, leaves) and (N, leaves, 3), NaN where nothing is
@@ -128,15 +191,17 @@ void read_start(const py::object& start, std::size_t leaves, FirstHitsQuery& que
   const auto s = py::reinterpret_borrow<py::dict>(start);
   for (const auto& item : s) {
     const auto key = py::str(item.first).cast<std::string>();
-    if (key != "value" && key != "gradient" && key != "realisation")
+    if (key != "value" && key != "gradient" && key != "realisation" && key != "segments")
       throw std::invalid_argument("start: unknown key '" + key +
-                                  "' (takes value, gradient, realisation).");
+                                  "' (takes value, gradient, realisation, segments).");
   }
   if (!s.contains("value") || !s.contains("gradient"))
     throw std::invalid_argument("start must hold value (N,) and gradient (N, 3).");
   read_states(s["value"], s["gradient"], leaves, query);
   if (s.contains("realisation"))
     query.realisation = realisations_argument(s["realisation"], query.rays.size(), leaves);
+  if (s.contains("segments"))
+    query.segments = segments_argument(s["segments"], query.rays.size() * leaves);
 }
 
 void read_rays(const py::object& origins, const py::object& directions, FirstHitsQuery& query) {
@@ -225,6 +290,7 @@ py::dict hits_dict(const FirstHits& hits, const FirstHitsSetup& setup) {
   }
   py::dict state("value"_a = value, "gradient"_a = slopes);
   if (!hits.realisation.empty()) state["realisation"] = realisations_dict(hits.realisation, leaves);
+  if (!hits.segments.empty()) state["segments"] = segments_dict(hits.segments);
   return py::dict("t"_a = t, "position"_a = position, "gradient"_a = gradient, "part"_a = part,
                   "state"_a = state, "counters"_a = counters_dict(hits.counters));
 }

@@ -27,6 +27,7 @@
     "rays that entered a kept realisation inside and were moved out for themselves alone")   \
   X(line_reach_limit, "lines longer than the tables of the spectral sampler")                \
   X(factorisations, "covariance matrices factorised")                                        \
+  X(condition_rows, "conditions that lines were drawn given")                                \
   X(pivots_dropped, "rows left out of a covariance matrix: determined by the others")        \
   X(mean_lookups, "evaluations of a mean that is not constant")                              \
   X(sigma_lookups, "evaluations of a deviation that is not constant")                        \

@@ -2,6 +2,7 @@
 
 #include "integrator/scatter.h"
 #include "process/realisation_memory.h"
+#include "process/segment_memory.h"
 #include "scene/scene_impl.h"
 
 namespace gpis {
@@ -42,7 +43,8 @@ struct PathTracer::Impl {
         starts(scene.stochastic.size()),
         memory(scene.stochastic.size()),
         shadow_memory(scene.stochastic.size()),
-        realisations(scene.stochastic.size()) {
+        realisations(scene.stochastic.size()),
+        segments(scene.stochastic.size()) {
     for (const auto& body : scene.bodies)
       if (body.surface.leaves().size() > shadow_lines.size())
         shadow_lines.resize(body.surface.leaves().size());
@@ -54,6 +56,7 @@ struct PathTracer::Impl {
                     Rng& random);
   bool closest(const Ray& ray, double t_max, Vertex& v);
   void remember_others(const Vertex& v);
+  void keep_segments(const Vertex& v);
   Vec3 draw(const GradientLaw& law) {
     if (!law.degenerate) counters->line_normals += 2;
     return law.draw(*rng);
@@ -80,6 +83,8 @@ struct PathTracer::Impl {
   PathMemory memory, shadow_memory;
   // That the path sees, of memory `global`; a shadow ray sees a copy.
   std::vector<RealisationMemory> realisations, shadow_realisations;
+  // What it has met, of memory `segments`; shadow rays read it alone.
+  std::vector<SegmentMemory> segments;
   const BlockPoints* points = nullptr;
   int bounce = 0;
   Rng* rng = nullptr;
@@ -112,6 +117,7 @@ PathSample PathTracer::Impl::trace(const Ray& camera_ray, double t_max) {
   for (std::size_t i = 0; i < memory.size(); ++i) {
     memory[i].reset();
     if (scene.stochastic[i].surface.memory() == Memory::global) realisations[i] = {(*rng)(), {}};
+    segments[i].segments.clear();
   }
 
   for (bounce = 0;; ++bounce) {
@@ -130,6 +136,7 @@ PathSample PathTracer::Impl::trace(const Ray& camera_ray, double t_max) {
 
     // Scatter, and light the vertex from sampled lights.
     remember_others(v);
+    keep_segments(v);
     Color direct;
     Vec3 normal;
     const std::optional<ScatterSample> next = scatter_at(ray, v, direct, normal);
@@ -155,6 +162,10 @@ PathSample PathTracer::Impl::trace(const Ray& camera_ray, double t_max) {
       if (rng->uniform() >= brightest) break;
       throughput *= 1 / brightest;
     }
+    // The segment that ends here ends in what is known of every process here.
+    for (std::size_t i = 0; i < memory.size(); ++i)
+      if (memory[i] && met[i] && scene.stochastic[i].surface.memory() == Memory::segments)
+        scene.stochastic[i].surface.keep_end(v.position, *memory[i], segments[i]);
     ray = {v.departure, next->direction};
     scatter_pdf = next->pdf;
   }
@@ -167,8 +178,8 @@ TreeHit PathTracer::Impl::first_hit(const Scene::Impl::Body& body, Line* body_li
   const std::size_t count = body.surface.leaves().size();
   for (std::size_t k = 0; k < count; ++k) {
     const std::optional<State>& state = remembered[body.first + k];
-    starts[k] = body.surface.leaves()[k].start_from(state ? &*state : nullptr, false,
-                                                    &kept[body.first + k]);
+    starts[k] = body.surface.leaves()[k].start_from(
+        state ? &*state : nullptr, false, &kept[body.first + k], &segments[body.first + k]);
   }
   return body.surface.first_hit(march, {body_lines, count}, ray, t_max, {starts.data(), count},
                                 random, *counters);
@@ -238,6 +249,15 @@ void PathTracer::Impl::remember_others(const Vertex& v) {
         memory[i] =
             surface.state(memory[i]->value, draw(surface.gradient_law(lines[i], v.t, *rng)));
     }
+  }
+}
+
+// What was drawn of every process on the way, memory `segments`.
+void PathTracer::Impl::keep_segments(const Vertex& v) {
+  for (std::size_t i = 0; i < memory.size(); ++i) {
+    const ProcessSurface& surface = scene.stochastic[i].surface;
+    if (met[i] && surface.memory() == Memory::segments)
+      surface.keep_segment(lines[i], v.t, segments[i]);
   }
 }
 

@@ -13,7 +13,14 @@ namespace gpis {
 Eigen::MatrixXd covariance_matrix(const GaussianProcess& process, const std::vector<Vec3>& x,
                                   const std::vector<Vec3>& y);
 
-// Joint samples of f at the points x, one a row; row i uses the random stream (seed, i).
+// Of f given the conditions, solved in blocks (posterior.h).
+struct PointLaw {
+  double mean, variance;
+};
+std::vector<PointLaw> posterior_at(const GaussianProcess& process, const std::vector<Vec3>& x);
+
+// Joint samples of f at the points x given the conditions, one a row; row i uses the random stream
+// (seed, i). Throws where too many conditions are near.
 Eigen::MatrixXd sample_at(const GaussianProcess& process, const std::vector<Vec3>& x,
                           Eigen::Index rows, std::uint64_t seed);
 

@@ -35,6 +35,7 @@ class ConvolutionPath {
   }
 
   double step() const { return step_; }
+  double value_mean() const { return 0; }
   double value_deviation() const { return 1; }
   void slope_law(double, double& mean, double& deviation) const {
     mean = 0;

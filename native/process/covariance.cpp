@@ -249,4 +249,20 @@ double Covariance::reach(double correlation) const {
   return farthest;
 }
 
+std::vector<Mat3> Covariance::reach_metrics(double correlation) const {
+  std::vector<Mat3> metrics;
+  if (anisotropy_) {
+    const double inverse = 1 / (reach(correlation) * longest_);
+    metrics.push_back({{Vec3{inverse, 0, 0}, Vec3{0, inverse, 0}, Vec3{0, 0, inverse}}});
+    return metrics;
+  }
+  for (const Term& term : terms_) {
+    Mat3 m = term.whitening;
+    const double reach = reach_of(term.radial, correlation);  // infinite: all is near
+    for (Vec3& row : m.row) row = row * (1 / reach);
+    metrics.push_back(m);
+  }
+  return metrics;
+}
+
 }  // namespace gpis

@@ -57,6 +57,9 @@ class Covariance {
   // Distance in whitened space, from where on correlations are below `correlation`; infinite where
   // none is known.
   double reach(double correlation) const;
+  // Metrics, one for each term, in which points further than 1 apart in all of them have
+  // correlations below `correlation`; none where none is known.
+  std::vector<Mat3> reach_metrics(double correlation) const;
   // The largest length scale anywhere: a distance in whitened space is at least the distance over
   // it.
   double longest_length() const { return longest_; }

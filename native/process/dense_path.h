@@ -48,6 +48,7 @@ class DensePath {
              Counters& counters);
 
   double step() const { return step_; }
+  double value_mean() const { return 0; }
   double value_deviation() const { return 1; }
   void slope_law(double, double& mean, double& deviation) const {
     mean = 0;

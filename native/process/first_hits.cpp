@@ -38,7 +38,9 @@ Counters for_each_hit(const TreeSurface& surface, const FirstHitsQuery& query,
     for (std::size_t k = 0; k < leaves; ++k) {
       const State* state = query.start.empty() ? nullptr : &query.start[i * leaves + k];
       if (state && std::isnan(state->value)) state = nullptr;
-      worker.starts[k] = surface.leaves()[k].start_from(state, inside, kept ? kept + k : nullptr);
+      worker.starts[k] = surface.leaves()[k].start_from(
+          state, inside, kept ? kept + k : nullptr,
+          query.segments.empty() ? nullptr : &query.segments[i * leaves + k]);
     }
     const TreeHit hit = surface.first_hit(worker.march, worker.lines, query.rays[i], query.t_max,
                                           worker.starts, rng, worker.counters);
@@ -77,6 +79,10 @@ FirstHits first_hits(const TreeSurface& surface, const FirstHitsQuery& query) {
   result.state.assign(rays * leaves, {nan, {nan, nan, nan}});
   result.realisation = query.realisation;
   if (surface.memory() == Memory::global) result.realisation.resize(rays * leaves);
+  if (surface.memory() == Memory::segments) {
+    result.segments = query.segments;
+    result.segments.resize(rays * leaves);
+  }
   result.counters =
       for_each_hit(surface, query, result.realisation,
                    [&](std::size_t i, std::vector<Line>& lines, const TreeHit& hit, Rng& rng,
@@ -91,7 +97,12 @@ FirstHits first_hits(const TreeSurface& surface, const FirstHitsQuery& query) {
                        const double value = winner ? 0 : leaf.value(lines[k], hit.t, rng);
                        counters.line_normals += 2;
                        const Vec3 gradient = leaf.gradient_law(lines[k], hit.t, rng).draw(rng);
-                       result.state[i * leaves + k] = leaf.state(value, gradient);
+                       State& state = result.state[i * leaves + k] = leaf.state(value, gradient);
+                       if (!result.segments.empty()) {
+                         SegmentMemory& kept = result.segments[i * leaves + k];
+                         leaf.keep_segment(lines[k], hit.t, kept);
+                         leaf.keep_end(query.rays[i].at(hit.t), state, kept);
+                       }
                        if (winner) result.gradient[i] = gradient * surface.sign(hit.leaf);
                      }
                    });

@@ -8,6 +8,7 @@
 
 #include "core/counters.h"
 #include "process/realisation_memory.h"
+#include "process/segment_memory.h"
 #include "process/tree_surface.h"
 
 namespace gpis {
@@ -20,7 +21,8 @@ struct FirstHitsQuery {
   std::vector<State> start;
   // One a ray and leaf, of memory `global`; empty: fresh ones.
   std::vector<RealisationMemory> realisation;
-  std::vector<char> inside;  // one a ray: those that travel inside the body; empty: none
+  std::vector<SegmentMemory> segments;  // the same of memory `segments`
+  std::vector<char> inside;             // one a ray: those that travel inside the body; empty: none
   std::uint64_t seed = 0, first_index = 0;  // row i uses the random stream (seed, first_index + i)
   int threads = 0;                          // 0 = all cores
   // Asked by the calling thread a few times a second; true ends all rays early, without hits.
@@ -34,6 +36,7 @@ struct FirstHits {
   // One a ray and leaf: value 0 at the leaf that was hit, NaN where the leaf was not sampled.
   std::vector<State> state;
   std::vector<RealisationMemory> realisation;  // that each has seen; memory `global` alone
+  std::vector<SegmentMemory> segments;         // and what it kept; memory `segments` alone
   Counters counters;
 };
 

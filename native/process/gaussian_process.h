@@ -10,6 +10,8 @@
 
 namespace gpis {
 
+struct Conditions;
+
 struct GaussianProcess {
   FieldPtr mean;
   FieldPtr sigma;  // standard deviation, never variance
@@ -21,11 +23,22 @@ struct GaussianProcess {
   // Now, in temporal length scales: realisations of one seed at two times are correlated as
   // exp(-Δ²/2). None: the process does not change with time.
   std::optional<double> time;
+  std::shared_ptr<const Conditions> conditions;  // what is known of f; null: nothing
 };
 
-// What a ray that leaves a surface point remembers of the process (definitions B1-B4); `global`: a
-// path sees one realisation.
-enum class Memory { none, renewal, renewal_plus, global };
+// What a ray that leaves a surface point remembers of the process (definitions B1-B4, B11);
+// `segments`: g on the last few segments of the path too (global-n); `global`: a path sees one
+// realisation.
+struct Memory {
+  enum Kind { none, renewal, renewal_plus, segments, global };
+  static constexpr int kMostSegments = 64;
+
+  constexpr Memory(Kind k = renewal_plus, int n = 0) : kind(k), count(n) {}
+  constexpr operator Kind() const { return kind; }
+
+  Kind kind;
+  int count;  // of segments
+};
 enum class Sampler { automatic, convolution, markov, spectral, nystrom, dense, realisation };
 
 }  // namespace gpis

@@ -87,7 +87,7 @@ void JointDensePath::draw(long index, Rng& rng, Counters& counters) {
     points_.push_back({index, points_.back().g, points_.back().dg});
     return;
   }
-  if (rows_.active() > kMostRows) rows_.forget(lasting_rows_, kKept);
+  reach(anchor_ + index * step_, counters);
   const LocalPoint p = point(anchor_ + index * step_);
   const double g = rows_.add_free(p, value_row(), rng, counters, kJitter);
   points_.push_back({index, g, rows_.add_free(p, slope_row(), rng, counters, kJitter)});

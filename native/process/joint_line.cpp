@@ -15,19 +15,62 @@ JointLine::Plan::Plan(const GaussianProcess& process) : covariance(process) {
   if (!covariance.differentiable())
     refuse("The kernel ", process.kernel->describe(),
            " has no gradient: the joint samplers take differentiable kernels.");
+  posterior = posterior_of(process);
 }
 
 void JointLine::begin(const Plan& plan, const LineGeometry& line, double anchor,
                       Counters& counters) {
   covariance_ = &plan.covariance;
+  posterior_ = plan.posterior;
   line_ = line;
   anchor_ = anchor;
-  rows_.reset(plan.covariance);
-  ++counters.factorisations;
-  lasting_rows_ = rows_.count();
   at_anchor_ = point(anchor);
+  begin_base(posterior_ ? posterior_->block(at_anchor_.x) : -1, counters);
+  rows_.reset(base_);
+  lasting_rows_ = rows_.count();
   rows_.law(at_anchor_, anchor_mean_, anchor_law_);
   pull_end_ = anchor;
+  // Of conditions that the line may come to meet, and of what it knows already.
+  pull_ = plan.pull() + (segments_ ? base_.known_norm() : 0);
+}
+
+void JointLine::begin_base(int block, Counters& counters) {
+  block_ = block;
+  if (block >= 0) {
+    base_.reset(posterior_->rows(block));
+    counters.condition_rows += base_.count();
+  } else {
+    base_.reset(*covariance_);
+  }
+  if (segments_)
+    for (const auto& segment : segments_->segments)
+      for (const SegmentMemory::Row& row : segment)
+        base_.add_known(covariance_->at(row.at), row.what, sign_ * row.value, row.noise, counters);
+  ++counters.factorisations;
+}
+
+void JointLine::reach(double t, Counters& counters) {
+  const int block = posterior_ ? posterior_->block(line_.origin + line_.direction * t) : -1;
+  const int own = rows_.active() - base_.count();
+  if (block == block_ && own <= kMostRows) return;
+  if (block != block_) begin_base(block, counters);
+  rows_.rebase(base_, std::min(own, kKept));
+}
+
+// A start that conditions or segments fix has no freedom left.
+double JointLine::value_deviation() const {
+  return anchor_law_(0, 0) > JointRows::kPivot * covariance_->variance()
+             ? std::sqrt(anchor_law_(0, 0))
+             : 0;
+}
+
+void JointLine::record(double t, std::vector<SegmentMemory::Row>& rows) const {
+  const Vec3& d = line_.direction;
+  rows_.visit_own(lasting_rows_,
+                  [&](const Vec3& at, const Functional& what, double value, double noise) {
+                    if (dot(at - line_.origin, d) <= t * dot(d, d))
+                      rows.push_back({at, what, sign_ * value, noise});
+                  });
 }
 
 void JointLine::slope_law(double g0, double& mean, double& deviation) const {

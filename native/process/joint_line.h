@@ -6,6 +6,8 @@
 #include "process/gaussian_process.h"
 #include "process/joint_rows.h"
 #include "process/path.h"
+#include "process/posterior.h"
+#include "process/segment_memory.h"
 
 namespace gpis {
 
@@ -15,18 +17,32 @@ class JointLine {
     // Refuses a kernel without gradient.
     explicit Plan(const GaussianProcess& process);
     Covariance covariance;
+    PosteriorPtr posterior;  // null: no conditions
     double correlation_error = 0;
+    // How far conditions may hold the mean of g from 0.
+    double pull() const { return posterior ? posterior->pull() : 0; }
   };
 
-  double value_deviation() const { return std::sqrt(anchor_law_(0, 0)); }
+  // The lines from here on are drawn given these segments too, null: none. `sign` -1: the ray sees
+  // -g of them.
+  void recall(const SegmentMemory* segments, double sign) {
+    segments_ = segments;
+    sign_ = sign;
+  }
+  // Appends what the line met of g up to t.
+  void record(double t, std::vector<SegmentMemory::Row>& rows) const;
+
+  double value_mean() const { return anchor_mean_[0]; }
+  double value_deviation() const;
   void slope_law(double g0, double& mean, double& deviation) const;
   void start_free(Rng& rng, Counters& counters, double& g, double& dg);
   double start(const PathStart& known, Rng& rng, Counters& counters);
-  double pull(double t) const { return t < pull_end_ ? rows_.known_norm() : 0; }
+  double pull(double t) const { return pull_ + (t < pull_end_ ? rows_.known_norm() : 0); }
   PathGradient gradient(double t, double g, double dg, Rng&) const;
 
  protected:
-  // More rows than these are not kept in one factor: new ones are then drawn given the last kKept.
+  // More rows of the line itself than these are not kept in one factor: new ones are then drawn
+  // given the last kKept.
   static constexpr int kMostRows = 240, kKept = 100;
 
   void begin(const Plan& plan, const LineGeometry& line, double anchor, Counters& counters);
@@ -34,6 +50,9 @@ class JointLine {
   SymMat3 along(const LocalPoint& p) const {  // ∂_d A
     return p.da[0] * line_.direction.x + p.da[1] * line_.direction.y + p.da[2] * line_.direction.z;
   }
+  // To be called before rows at t and behind it are drawn: forgets the oldest ones, goes on to the
+  // conditions that matter there.
+  void reach(double t, Counters& counters);
   Functional value_row() const { return {}; }
   Functional slope_row() const { return {0, line_.direction}; }
   // Standard deviation of the middle of [a, a + h] from the cubic through values and slopes of both
@@ -45,9 +64,17 @@ class JointLine {
   double anchor_ = 0;
   LocalPoint at_anchor_;
   JointRows rows_;
-  int lasting_rows_ = 0;  // at the head of rows_: never forgotten
 
  private:
+  // Starts base_ with the conditions of a block and the segments.
+  void begin_base(int block, Counters& counters);
+
+  JointRows base_;  // never forgotten; the line's own rows come after them
+  int lasting_rows_ = 0;
+  PosteriorPtr posterior_;
+  int block_ = -1;
+  const SegmentMemory* segments_ = nullptr;
+  double sign_ = 1, pull_ = 0;
   Eigen::Vector4d anchor_mean_;
   Eigen::Matrix4d anchor_law_;  // of (g, ∇g)
   double pull_end_ = 0;

@@ -8,6 +8,15 @@ void JointRows::reset(const Covariance& covariance) {
   truncate(0);
 }
 
+void JointRows::reset(const JointRows& base) {
+  covariance_ = base.covariance_;
+  base_ = 0;
+  rows_.assign(base.rows_.begin() + base.base_, base.rows_.end());
+  factor_ = base.factor_;
+  xi_ = base.xi_;
+  known_norm2_ = base.known_norm2_;
+}
+
 void JointRows::truncate(int count) {
   const auto n = static_cast<std::size_t>(count);
   rows_.resize(n);
@@ -40,18 +49,17 @@ void JointRows::append(const Row& row, double pivot, double xi) {
   if (row.known) known_norm2_ += xi * xi;
 }
 
-double JointRows::add_known(const LocalPoint& at, const Functional& what, double value,
-                            double noise, Counters& counters) {
+JointRows::Known JointRows::add_known(const LocalPoint& at, const Functional& what, double value,
+                                      double noise, Counters& counters) {
   const double own = covariance_->between(at, what, at, what) + noise;
   double mean;
   const double pivot = border(at, what, own, mean);
-  if (!(pivot > kPivot * own)) {
+  const Known known{std::sqrt(own), pivot / own, value - mean};
+  if (pivot > kPivot * own)
+    append({at, what, value, noise, true}, pivot, known.off / std::sqrt(pivot));
+  else
     ++counters.pivots_dropped;
-    return 0;
-  }
-  const double xi = (value - mean) / std::sqrt(pivot);
-  append({at, what, value, noise, true}, pivot, xi);
-  return xi;
+  return known;
 }
 
 double JointRows::add_free(const LocalPoint& at, const Functional& what, Rng& rng,
@@ -69,20 +77,47 @@ double JointRows::add_free(const LocalPoint& at, const Functional& what, Rng& rn
   return value;
 }
 
-void JointRows::forget(int first, int last) {
-  std::vector<Row> kept(rows_.begin(), rows_.begin() + first);
-  kept.insert(kept.end(), rows_.end() - last, rows_.end());
+void JointRows::rebase(const JointRows& base, int last) {
+  std::vector<Row> kept(rows_.end() - last, rows_.end());
   base_ = count();
-  known_norm2_ = 0;
-  factor_.clear();
-  xi_.clear();
-  for (const Row& row : kept) {
+  const auto from = base.rows_.begin() + base.base_;
+  rows_.insert(rows_.end(), from, base.rows_.end());
+  for (auto row = rows_.begin() + base_; row != rows_.end(); ++row) row->copied = true;
+  factor_ = base.factor_;
+  xi_ = base.xi_;
+  known_norm2_ = base.known_norm2_;
+  for (Row& row : kept) {
+    row.copied = true;
     const double own = covariance_->between(row.at, row.what, row.at, row.what) + row.noise;
     double mean;
     const double pivot = border(row.at, row.what, own, mean);
     if (pivot > (row.known ? kPivot : kDrawnPivot) * own)
       append(row, pivot, (row.value - mean) / std::sqrt(pivot));
   }
+}
+
+Eigen::VectorXd JointRows::whitened(const LocalPoint& at, const Functional& what) const {
+  Eigen::VectorXd v(active());
+  for (int i = 0; i < active(); ++i)
+    v[i] = (covariance_->between(at, what, row(i).at, row(i).what) - factor_row(i).dot(v.head(i))) /
+           diagonal(i);
+  return v;
+}
+
+std::vector<double> JointRows::weights(std::vector<double> whitened) const {
+  Eigen::Map<Eigen::VectorXd> w(whitened.data(), active());
+  for (int i = active() - 1; i >= 0; --i) {
+    w[i] /= diagonal(i);
+    w.head(i) -= w[i] * factor_row(i);
+  }
+  return whitened;
+}
+
+std::vector<double> JointRows::whiten(const std::vector<double>& values) const {
+  std::vector<double> out = values;
+  Eigen::Map<Eigen::VectorXd> v(out.data(), active());
+  for (int i = 0; i < active(); ++i) v[i] = (v[i] - factor_row(i).dot(v.head(i))) / diagonal(i);
+  return out;
 }
 
 void JointRows::law(const LocalPoint& at, Eigen::Vector4d& mean,
@@ -100,13 +135,7 @@ void JointRows::law(const LocalPoint& at, Eigen::Vector4d& mean,
 }
 
 JointRows::Mean JointRows::mean() const {
-  Mean out{base_, xi_};
-  Eigen::Map<Eigen::VectorXd> w(out.weights.data(), active());
-  for (int i = active() - 1; i >= 0; --i) {
-    w[i] /= diagonal(i);
-    w.head(i) -= w[i] * factor_row(i);
-  }
-  return out;
+  return {base_, weights(xi_)};
 }
 
 void JointRows::evaluate(const Mean& mean, const LocalPoint& at, const Vec3& d, const SymMat3& da,

@@ -20,25 +20,55 @@ class JointRows {
   static constexpr double kPivot = 1e-10, kDrawnPivot = 1e-7;
 
   void reset(const Covariance& covariance);
+  // Starts with the rows of another: solved once, used by many.
+  void reset(const JointRows& base);
   // Forgets all rows but the first `count`.
   void truncate(int count);
   int count() const { return static_cast<int>(rows_.size()); }
   // Rows that new ones are drawn given: all, or those since `forget`.
   int active() const { return count() - base_; }
 
-  // A functional with a known value (known but for noise of this variance). The return: how many
-  // standard deviations the value lies from what the rows before it say; 0 where it is left out.
-  double add_known(const LocalPoint& at, const Functional& what, double value, double noise,
-                   Counters& counters);
+  // What the rows before it say of a known value.
+  struct Known {
+    double deviation;  // its prior one
+    double left;       // share of its variance that they leave
+    double off;        // how far it lies from what they say
+  };
+  // A functional with a known value (known but for noise of this variance).
+  Known add_known(const LocalPoint& at, const Functional& what, double value, double noise,
+                  Counters& counters);
   // A functional drawn given the rows before it, with independent noise of `jitter` times its own
   // variance; its value.
   double add_free(const LocalPoint& at, const Functional& what, Rng& rng, Counters& counters,
                   double jitter = 0);
-  // From now on rows are drawn given the first `first` and the `last` rows alone.
-  void forget(int first, int last);
+  // From now on rows are drawn given those of `base` and the `last` active rows alone.
+  void rebase(const JointRows& base, int last);
 
   // Law of (g, ∇g) at a point, given the active rows.
   void law(const LocalPoint& at, Eigen::Vector4d& mean, Eigen::Matrix4d& covariance) const;
+
+  // A functional in units of the active rows' independent parts: its covariance with what they
+  // leave of another is the prior's less the product of both; its mean is the product with
+  // `whitened`.
+  Eigen::VectorXd whitened(const LocalPoint& at, const Functional& what) const;
+  Eigen::Map<const Eigen::VectorXd> whitened() const { return {xi_.data(), active()}; }
+  // Solves for the weights of active rows: those of `mean` from other whitened values.
+  std::vector<double> weights(std::vector<double> whitened) const;
+  // Whitened values of the active rows had their values been these.
+  std::vector<double> whiten(const std::vector<double>& values) const;
+
+  // Rows of g that this line met first, in order; not those it was told to start with.
+  template <class Visit>
+  void visit_own(int first, const Visit& visit) const {
+    for (std::size_t i = first; i < rows_.size(); ++i)
+      if (!rows_[i].copied) visit(rows_[i].at.x, rows_[i].what, rows_[i].value, rows_[i].noise);
+  }
+
+  // Of active row i, for those who sum over rows.
+  const LocalPoint& point(int i) const { return row(i).at; }
+  const Functional& functional(int i) const { return row(i).what; }
+  double value(int i) const { return row(i).value; }
+  double noise(int i) const { return row(i).noise; }
 
   // The mean of g given the active rows is Σ weight · cov(g, row). Later rows leave it as it is.
   struct Mean {
@@ -60,6 +90,7 @@ class JointRows {
     Functional what;
     double value, noise;
     bool known;
+    bool copied = false;  // from a base, or kept when others were forgotten
   };
   using FactorRow = Eigen::Map<const Eigen::VectorXd>;
 

@@ -15,6 +15,7 @@ struct Line::Impl {
   const PlannedLine* plan = nullptr;
   bool inside = false;
   const std::atomic<bool>* stop = nullptr;
+  bool near_conditions = false;  // drawn given conditions, where some lines are not
 
   // Where the sample path begins: the first uncertain t.
   double anchor = 0;

@@ -11,6 +11,7 @@ class LineNoise {
   virtual ~LineNoise() = default;
   virtual void reset(const LineGeometry& line, double anchor, double t_end, Counters& counters) = 0;
   virtual double step() const = 0;
+  virtual double value_mean() const = 0;
   virtual double value_deviation() const = 0;
   virtual void slope_law(double value, double& mean, double& deviation) const = 0;
   virtual void start_free(Rng& rng, Counters& counters, double& g, double& dg) = 0;
@@ -30,6 +31,7 @@ class PathNoise final : public LineNoise {
     path_.reset(plan_, line, anchor, t_end, counters);
   }
   double step() const override { return path_.step(); }
+  double value_mean() const override { return path_.value_mean(); }
   double value_deviation() const override { return path_.value_deviation(); }
   void slope_law(double value, double& mean, double& deviation) const override {
     path_.slope_law(value, mean, deviation);

@@ -8,6 +8,8 @@
 
 namespace gpis {
 
+class JointLine;
+class Posterior;
 struct PlannedLine;
 
 class LineSampler {
@@ -22,6 +24,11 @@ class LineSampler {
                                 Rng& rng) const = 0;
   // The path of a leaf of a tree, which marches all of its leaves itself.
   virtual std::unique_ptr<LineNoise> noise(Line::Impl& line) const = 0;
+  // The path where it is drawn jointly with what else is known of g; null for other paths.
+  virtual JointLine* joint(Line::Impl&) const { return nullptr; }
+  // g given the conditions; null where there are none. How far they may hold its mean from 0.
+  virtual std::shared_ptr<const Posterior> posterior() const { return nullptr; }
+  virtual double condition_pull() const { return 0; }
   // Bound on |implied - exact correlation| of the path.
   virtual double correlation_error() const = 0;
 };

@@ -43,6 +43,7 @@ class March {
   double run(double t_begin, double t_end, const Start& start) {
     double a = t_begin;
     double threshold = plan_.skip_threshold;
+    if constexpr (requires { path_plan_.pull(); }) threshold += plan_.sigma_max * path_plan_.pull();
     if (start.kind == Start::Kind::outside) {
       a = mean_.above_until(a, t_end, threshold);
       if (!(a < t_end)) {
@@ -222,9 +223,14 @@ class March {
       const Point p = combine(a, g, dg);
       if (p.f > 0 || p.sigma == 0) return p;
       // A draw that is outside already follows the truncated law; another one is replaced by it.
-      const double deviation = path_.value_deviation();
+      const double mean = path_.value_mean(), deviation = path_.value_deviation();
+      if (!(deviation > 0)) {  // known to lie inside
+        ++counters_.line_entry_inside;
+        return p;
+      }
       PathStart known;
-      known.value = deviation * truncated_normal(-p.mean / (p.sigma * deviation), rng_);
+      known.value =
+          mean + deviation * truncated_normal((-p.mean / p.sigma - mean) / deviation, rng_);
       ++counters_.truncated_normals;
       return combine(a, known.value, path_.start(known, rng_, counters_));
     }

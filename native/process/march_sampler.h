@@ -2,6 +2,7 @@
 #pragma once
 
 #include "process/field_lines.h"
+#include "process/joint_line.h"
 #include "process/line_sampler.h"
 #include "process/march.h"
 
@@ -36,6 +37,21 @@ class MarchSampler final : public LineSampler {
 
   std::unique_ptr<LineNoise> noise(Line::Impl& line) const override {
     return std::make_unique<PathNoise<Path>>(line.path<Path>(), plan_);
+  }
+
+  JointLine* joint(Line::Impl& line) const override {
+    if constexpr (std::derived_from<Path, JointLine>) return &line.path<Path>();
+    return nullptr;
+  }
+
+  std::shared_ptr<const Posterior> posterior() const override {
+    if constexpr (requires { plan_.posterior; }) return plan_.posterior;
+    return nullptr;
+  }
+
+  double condition_pull() const override {
+    if constexpr (requires { plan_.pull(); }) return plan_.pull();
+    return 0;
   }
 
   double correlation_error() const override { return plan_.correlation_error; }

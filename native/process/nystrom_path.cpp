@@ -75,14 +75,14 @@ double NystromPath::next_node(double t) const {
 }
 
 void NystromPath::extend(Rng& rng, Counters& counters) {
-  if (rows_.active() > kMostRows) rows_.forget(lasting_rows_, kKept);
   const double begin = nodes_[end_];
   for (int i = 0; i < kBlock && (i == 0 || nodes_[end_] < t_end_); ++i) {
     ++end_;
     while (nodes_.size() <= end_ + kBeyond) {
       nodes_.push_back(next_node(nodes_.back()));
-      if (std::isfinite(nodes_.back()))
-        rows_.add_free(point(nodes_.back()), value_row(), rng, counters);
+      if (!std::isfinite(nodes_.back())) continue;
+      reach(nodes_.back(), counters);
+      rows_.add_free(point(nodes_.back()), value_row(), rng, counters);
     }
   }
   // At infinity where g is constant along the line.
@@ -94,13 +94,14 @@ void NystromPath::prepare(long cell, Rng& rng, Counters& counters) {
   const double left = anchor_ + cell * step_, right = std::min(left + step_, t_end_);
   if (left > nodes_.back()) {  // a stretch was skipped: a run of its own, given all before it
     const LocalPoint at = point(left);
+    reach(left, counters);
     rows_.add_free(at, value_row(), rng, counters);
     rows_.add_free(at, slope_row(), rng, counters);
     begin_run(left);
   }
   while (nodes_[end_] < right || blocks_.empty()) extend(rng, counters);
   if (std::isfinite(step_) && (margin_ < 0 || !covariance_->stationary()))
-    margin_ = 1.25 * 4.5 / 0.75 * deviation_from_cubic(left, step_);
+    margin_ = 1.25 * (4.5 + pull(left)) / 0.75 * deviation_from_cubic(left, step_);
 }
 
 void NystromPath::evaluate(double t, double& g, double& dg) const {

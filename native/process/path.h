@@ -67,8 +67,9 @@ concept LinePath =
   { Path::kLastStep } -> std::convertible_to<double>;
   // Length of a cell in t; infinite where g is constant on the line.
   { drawn.step() } -> std::same_as<double>;
-  // Laws at the anchor, before the start: standard deviation of g, and mean (first out) and
-  // standard deviation (second) of its slope given the value.
+  // Laws at the anchor, before the start: mean and standard deviation of g, and mean (first out)
+  // and standard deviation (second) of its slope given the value.
+  { drawn.value_mean() } -> std::same_as<double>;
   { drawn.value_deviation() } -> std::same_as<double>;
   drawn.slope_law(t, out, out);
   path.start_free(rng, counters, out, out);                      // g, g' at the anchor

@@ -6,6 +6,8 @@
 #include "field/constant_field.h"
 #include "field/scaled_field.h"
 #include "kernel/scaled_kernel.h"
+#include "process/conditioned_sampler.h"
+#include "process/conditions.h"
 #include "process/covariance.h"
 #include "process/gaussian_process.h"
 #include "process/realisation.h"
@@ -32,6 +34,18 @@ struct Choice {
   std::string reason;
 };
 
+// What lines are drawn by that something is known of beside their start: conditions, segments.
+Choice choose_joint(const GaussianProcess& process, Sampler asked, const std::string& why) {
+  if (asked != Sampler::automatic && asked != Sampler::nystrom && asked != Sampler::dense)
+    refuse(
+        "this sampler draws a line from its start alone; with conditions or memory 'global-n' take "
+        "'auto', 'nystrom' or 'dense'.");
+  const bool smooth =
+      asked == Sampler::nystrom || (asked == Sampler::automatic && Covariance(process).smooth());
+  if (smooth) return {make_nystrom, "nystrom: " + why};
+  return {make_joint_dense, "dense: " + why};
+}
+
 Choice choose(const GaussianProcess& process, Sampler asked) {
   const auto terms = process.kernel->terms();
   const Radial* radial = nullptr;  // of the one term without wave, where that is all
@@ -56,8 +70,9 @@ Choice choose(const GaussianProcess& process, Sampler asked) {
       // One factor serves all lines of one radial correlation.
       return {radial ? make_dense : make_joint_dense, "dense: asked for"};
     case Sampler::realisation:
-      return {make_realisation,
-              "realisation: " + Realisation(process, Realisation::Access::rays).describe()};
+      return {
+          make_realisation,
+          "realisation: " + Realisation(process, Realisation::Access::rays, nullptr).describe()};
     case Sampler::automatic:
       break;
   }
@@ -109,11 +124,19 @@ std::shared_ptr<const GaussianProcess> inside_out(const GaussianProcess& process
     out->mean = std::make_shared<ConstantField>(-constant->value({}));
   else
     out->mean = std::make_shared<ScaledField>(process.mean, -1.0);
+  if (process.conditions) {
+    auto conditions = std::make_shared<Conditions>(*process.conditions);
+    for (Conditions::Point& p : conditions->points) {
+      if (p.value) p.value = -*p.value;
+      if (p.gradient) p.gradient = -*p.gradient;
+    }
+    out->conditions = std::move(conditions);
+  }
   return out;
 }
 
-PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Sampler sampler,
-                      double missed_root) {
+PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Memory memory,
+                      Sampler sampler, double missed_root) {
   PlannedLine plan;
   process = normalised(std::move(process));
   const Range sigma = process->sigma->range();
@@ -164,9 +187,29 @@ PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Sampler sa
     plan.line_sampler = make_zero(*process, plan.bounds);
     plan.sampler_reason = "none: sigma is 0, the surface is the mean itself";
   } else {
-    const Choice choice = choose(*process, sampler);
-    plan.line_sampler = choice.make(*process, plan.bounds);
-    plan.sampler_reason = choice.reason;
+    if (memory == Memory::segments) {
+      const Choice joint =
+          choose_joint(*process, sampler, "lines are drawn given earlier segments");
+      plan.line_sampler = joint.make(*process, plan.bounds);
+      plan.sampler_reason = joint.reason;
+    } else if (process->conditions && sampler != Sampler::realisation) {
+      const Choice joint = choose_joint(*process, sampler, "rays near conditions");
+      auto near = joint.make(*process, plan.bounds);
+      plan.sampler_reason = joint.reason;
+      if (sampler == Sampler::automatic) {
+        GaussianProcess free = *process;
+        free.conditions = nullptr;
+        const Choice others = choose(free, sampler);
+        near = make_conditioned(std::move(near), others.make(free, plan.bounds));
+        plan.sampler_reason += "; others " + others.reason;
+      }
+      plan.line_sampler = std::move(near);
+    } else {
+      const Choice choice = choose(*process, sampler);
+      plan.line_sampler = choice.make(*process, plan.bounds);
+      plan.sampler_reason = choice.reason;
+    }
+    plan.condition_pull = plan.line_sampler->condition_pull();
   }
   plan.process = std::move(process);
   return plan;

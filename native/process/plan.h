@@ -15,6 +15,7 @@ struct PlannedLine {
   double skip_threshold =
       0;  // where the mean exceeds it, the surface is certainly absent (definitions B13)
   double skip_deviations = 0;  // the same in standard deviations
+  double condition_pull = 0;   // how far conditions may hold the mean of g from 0
   double smooth_scale = kInfinity;
   double mean_lipschitz = kInfinity, sigma_lipschitz = kInfinity;
   Box3 bounds;       // object space; outside there is no surface
@@ -27,7 +28,7 @@ struct PlannedLine {
 std::shared_ptr<const GaussianProcess> inside_out(const GaussianProcess& process);
 
 // Throws std::invalid_argument with a sentence where the process cannot be rendered.
-PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Sampler sampler,
-                      double missed_root);
+PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Memory memory,
+                      Sampler sampler, double missed_root);
 
 }  // namespace gpis

@@ -45,8 +45,9 @@ int count_lattices(const std::vector<LatticeField>& fields) {
 
 }  // namespace
 
-Realisation::Realisation(const GaussianProcess& process, Access access)
-    : lattices_(lattice_fields(terms_of(process))),
+Realisation::Realisation(const GaussianProcess& process, Access access, PosteriorPtr posterior)
+    : posterior_(std::move(posterior)),
+      lattices_(lattice_fields(terms_of(process))),
       noise_(access == Access::rays ? LatticeNoise::Cache{{3, 3, 3}, count_lattices(lattices_)}
                                     // 2 MB a lattice
                                     : LatticeNoise::Cache{{6, 4, 4}, 1}) {
@@ -69,9 +70,42 @@ void Realisation::draw(std::uint64_t seed, std::optional<double> time) {
   time_ = time;
   noise_.reset(seed, time);
   for (SpectralField& field : spectra_) spectral_normals_ += field.draw(seed, time);
+  if (posterior_) weights_.assign(posterior_->blocks(), {});
 }
 
 FieldSample Realisation::sample(const Vec3& x) {
+  FieldSample g = free_sample(x);
+  if (posterior_ && posterior_->conditions().near({x, {}}, 0, 0)) add_conditions(x, g);
+  return g;
+}
+
+void Realisation::add_conditions(const Vec3& x, FieldSample& g) {
+  const LocalPoint at = posterior_->covariance().at(x);
+  posterior_->blend(x, [&](int block, double weight, const Vec3& slope) {
+    const Eigen::Vector4d part = posterior_->sum(block, weights(block), at);
+    g.value += weight * part[0];
+    g.gradient += Vec3{part[1], part[2], part[3]} * weight + slope * part[0];
+  });
+}
+
+const std::vector<double>& Realisation::weights(int block) {
+  std::vector<double>& w = weights_[block];
+  const JointRows& rows = posterior_->rows(block);
+  if (!w.empty() || rows.count() == 0) return w;
+  w.resize(rows.count());
+  for (int i = 0; i < rows.count(); ++i) {
+    const Functional& what = rows.functional(i);
+    const FieldSample g = free_sample(rows.point(i).x);
+    w[i] = rows.value(i) - what.value * g.value - dot(what.slope, g.gradient);
+    if (rows.noise(i) > 0) {
+      Rng rng(seed_, (std::uint64_t{1} << 40) + posterior_->condition(block, i));
+      w[i] += std::sqrt(rows.noise(i)) * rng.normal();
+    }
+  }
+  return w = rows.weights(rows.whiten(w));
+}
+
+FieldSample Realisation::free_sample(const Vec3& x) {
   FieldSample g;
   for (LatticeField& field : lattices_) field.add(noise_, x, g);
   for (SpectralField& field : spectra_) field.add(x, g);
@@ -87,6 +121,7 @@ void Realisation::set_line(const Vec3& o, const Vec3& d) {
   origin_ = o;
   direction_ = d;
   for (SpectralField& field : spectra_) field.set_line(o, d);
+  near_ = posterior_ && posterior_->conditions().near({o, d}, -kInfinity, kInfinity);
 }
 
 void Realisation::on_line(double t, double& g, double& dg) {
@@ -100,6 +135,11 @@ void Realisation::on_line(double t, double& g, double& dg) {
   g = sample.value;
   dg = dot(sample.gradient, direction_);
   for (SpectralField& field : spectra_) field.add_on_line(t, g, dg);
+  if (!near_) return;
+  FieldSample conditions;
+  add_conditions(x, conditions);
+  g += conditions.value;
+  dg += dot(conditions.gradient, direction_);
 }
 
 double Realisation::fourth_derivative() const {
@@ -147,14 +187,27 @@ void Realisation::fill(const Vec3& origin, double spacing, const std::array<int,
   for (SpectralField& field : spectra_)
     for (int i = 0; i < size[0]; ++i)
       field.add_slice(origin + Vec3{i * spacing, 0, 0}, spacing, size[1], size[2], row(i, 0));
+  if (!posterior_) return;
+  for (int i = 0; i < size[0]; ++i)
+    for (int j = 0; j < size[1]; ++j) {
+      const Vec3 o = origin + Vec3{double(i), double(j), 0} * spacing;
+      if (!posterior_->conditions().near({o, {0, 0, spacing}}, 0, size[2] - 1)) continue;
+      for (int k = 0; k < size[2]; ++k) {
+        const Vec3 x = o + Vec3{0, 0, k * spacing};
+        if (!posterior_->conditions().near({x, {}}, 0, 0)) continue;
+        FieldSample conditions;
+        add_conditions(x, conditions);
+        row(i, j)[k] += static_cast<float>(conditions.value);
+      }
+    }
 }
 
 std::string Realisation::describe() const {
   std::ostringstream text;
   const int lattices = count_lattices(lattices_);
   if (varying_)
-    return "a lattice of white noise under length scales that vary, exactly Gaussian, correlation "
-           "exact to 3e-7";
+    text << "a lattice of white noise under length scales that vary, exactly Gaussian, correlation "
+            "exact to 3e-7";
   if (lattices > 0)
     text << lattices << (lattices == 1 ? " lattice" : " lattices")
          << " of white noise, exactly Gaussian, correlation exact to 3e-7";

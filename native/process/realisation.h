@@ -9,6 +9,7 @@
 
 #include "process/gaussian_process.h"
 #include "process/lattice_field.h"
+#include "process/posterior.h"
 #include "process/spectral_field.h"
 #include "process/varying_lattice.h"
 
@@ -19,12 +20,14 @@ class Realisation {
   // Where it will be asked for next: close to the last point, on rays, or on whole rows of a grid.
   enum class Access { rays, rows };
   // Throws std::invalid_argument where the kernel has no normal form, or none under its anisotropy.
-  Realisation(const GaussianProcess& process, Access access);
+  // `posterior`: of the conditions that the process has, null where it has none.
+  Realisation(const GaussianProcess& process, Access access, PosteriorPtr posterior);
 
   // Another realisation, a pure function of (seed, time). `time` in temporal length scales: the
   // realisations of one seed at two times are correlated as exp(-Δ²/2).
   void draw(std::uint64_t seed, std::optional<double> time);
 
+  // Given the conditions.
   FieldSample sample(const Vec3& x);
 
   // The restriction to o + t d: values, and slopes per t.
@@ -44,6 +47,15 @@ class Realisation {
   std::string describe() const;
 
  private:
+  FieldSample free_sample(const Vec3& x);
+  // What the conditions add (Matheron's rule): Σ weight · cov(g, condition), the weights solved in
+  // every block from what the conditions say less what the free sample has there.
+  void add_conditions(const Vec3& x, FieldSample& g);
+  const std::vector<double>& weights(int block);
+
+  PosteriorPtr posterior_;
+  std::vector<std::vector<double>> weights_;  // of blocks; empty: not solved yet
+  bool near_ = false;                         // conditions are near the line
   std::vector<LatticeField> lattices_;
   std::optional<VaryingLattice> varying_;
   double varying_scale_ = 1;

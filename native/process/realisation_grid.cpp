@@ -50,8 +50,9 @@ std::optional<RealisationGrid> realise(const GaussianProcess& process,
     Realisation realisation;
     std::vector<float> g;
   };
+  const PosteriorPtr posterior = posterior_of(process);
   tbb::enumerable_thread_specific<Worker> workers([&] {
-    Worker worker{Realisation(process, Realisation::Access::rows), {}};
+    Worker worker{Realisation(process, Realisation::Access::rows, posterior), {}};
     worker.realisation.draw(query.seed, process.time);
     return worker;
   });
@@ -84,8 +85,9 @@ std::optional<RealisationGrid> realise(const GaussianProcess& process,
 std::vector<FieldSample> realise_at(const GaussianProcess& process, const std::vector<Vec3>& points,
                                     std::uint64_t seed, int count, int threads) {
   std::vector<FieldSample> out(points.size() * count);
+  const PosteriorPtr posterior = posterior_of(process);
   tbb::enumerable_thread_specific<Realisation> workers(
-      [&] { return Realisation(process, Realisation::Access::rays); });
+      [&] { return Realisation(process, Realisation::Access::rays, posterior); });
   tbb::task_arena(arena_of(threads)).execute([&] {
     tbb::parallel_for(0, count, [&](int n) {
       Realisation& realisation = workers.local();

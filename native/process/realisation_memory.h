@@ -4,20 +4,36 @@
 #include <cstdint>
 
 #include "field/field.h"
-#include "process/covariance.h"
+#include "process/posterior.h"
 
 namespace gpis {
 
 // g made to have given values at one point, by Matheron's rule (math.md §3): g(x) += the covariance
-// of g(x) with the functional weight.value g + weight.slope · ∇g at that point.
+// of g(x) with the functional weight.value g + weight.slope · ∇g at that point, under what is known
+// of g already.
 struct RealisationCondition {
   bool active = false;
   Vec3 at;
   Functional weight;
+  // Of the rows of the block there, where the process has conditions: what they take back.
+  int block = -1;
+  std::vector<double> taken;
 
-  void add(const Covariance& covariance, const Vec3& x, FieldSample& g) const {
+  // `posterior` null: no conditions.
+  void solve(const Posterior* posterior) {
+    if (!active || !posterior) return;
+    block = posterior->block(at);
+    const JointRows& rows = posterior->rows(block);
+    const Eigen::VectorXd v = rows.whitened(posterior->covariance().at(at), weight);
+    taken = rows.weights({v.begin(), v.end()});
+  }
+
+  void add(const Covariance& covariance, const Posterior* posterior, const Vec3& x,
+           FieldSample& g) const {
     if (!active) return;
-    const Eigen::Vector4d c = covariance.cross(covariance.at(x), covariance.at(at), weight);
+    const LocalPoint here = covariance.at(x);
+    Eigen::Vector4d c = covariance.cross(here, covariance.at(at), weight);
+    if (block >= 0) c -= posterior->sum(block, taken, here);
     g.value += c[0];
     g.gradient += Vec3{c[1], c[2], c[3]};
   }

@@ -8,20 +8,23 @@
 namespace gpis {
 namespace {
 
-// Of a symmetric matrix that is singular where the kernel is constant along an axis.
-Mat3 pseudo_inverse(const Mat3& m) {
-  Eigen::Matrix3d a;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) a(i, j) = m.row[i][j];
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(a);
-  const double floor = 1e-12 * eigen.eigenvalues()[2];
-  Eigen::Vector3d inverse = Eigen::Vector3d::Zero();
-  for (int i = 0; i < 3; ++i)
-    if (eigen.eigenvalues()[i] > floor) inverse[i] = 1 / eigen.eigenvalues()[i];
-  a = eigen.eigenvectors() * inverse.asDiagonal() * eigen.eigenvectors().transpose();
-  Mat3 out;
-  for (int i = 0; i < 3; ++i) out.row[i] = {a(i, 0), a(i, 1), a(i, 2)};
-  return out;
+// Of a symmetric matrix that is singular where the kernel is constant along an axis, or conditions
+// leave no freedom.
+Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& matrix) {
+  // Values and slopes have units of their own.
+  const Eigen::VectorXd unit =
+      matrix.diagonal().unaryExpr([](double v) { return v > 0 ? 1 / std::sqrt(v) : 1.0; });
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(unit.asDiagonal() * matrix *
+                                                             unit.asDiagonal());
+  const double floor = 1e-12 * eigen.eigenvalues().maxCoeff();
+  const Eigen::VectorXd inverse =
+      eigen.eigenvalues().unaryExpr([&](double v) { return v > floor ? 1 / v : 0.0; });
+  return unit.asDiagonal() * eigen.eigenvectors() * inverse.asDiagonal() *
+         eigen.eigenvectors().transpose() * unit.asDiagonal();
+}
+
+Eigen::Vector4d row(double value, const Vec3& slope) {
+  return {value, slope.x, slope.y, slope.z};
 }
 
 }  // namespace
@@ -31,6 +34,7 @@ RealisationPath::Plan::Plan(const GaussianProcess& p, const Box3&)
   if (!covariance->differentiable())
     refuse("The kernel ", p.kernel->describe(),
            " has no gradient: the realisation sampler cannot find its surface.");
+  posterior = posterior_of(p);
 }
 
 void RealisationPath::reset(const Plan& plan, const LineGeometry& line, double anchor, double,
@@ -39,33 +43,49 @@ void RealisationPath::reset(const Plan& plan, const LineGeometry& line, double a
   line_ = line;
   anchor_ = anchor;
   drawn_ = false;
-  pull_ = 0;
+  pull_ = plan.pull();
   entry_ = own_ = {};
   sign_ = kept_sign_;
   realisation_ = nullptr;
   for (const Pool& entry : pool_)
     if (entry.plan == &plan) realisation_ = entry.realisation.get();
   if (!realisation_) {
-    pool_.push_back(
-        {&plan, std::make_unique<Realisation>(*plan.process, Realisation::Access::rays)});
+    pool_.push_back({&plan, std::make_unique<Realisation>(*plan.process, Realisation::Access::rays,
+                                                          plan.posterior)});
     realisation_ = pool_.back().realisation.get();
   }
   counted_ = realisation_->normals();
+  const LocalPoint at = plan.covariance->at(point(anchor));
+  if (plan.posterior) {
+    plan.posterior->law(at, mean_, law_);
+    law_(0, 0) = std::max(0.0, law_(0, 0));
+  } else {
+    mean_.setZero();
+    law_ = plan.covariance->block(at, at);
+  }
+  // What conditions add has a norm below theirs and that of what is drawn there.
+  added_norm_ = plan.posterior ? plan.pull() + 4.5 + std::sqrt(plan.posterior->most_rows()) : 0;
   // Cells over which the path is off its cubic by .01 (see draw).
-  const double expected = realisation_->expected_fourth_derivative(line.direction);
-  step_ =
-      expected > 0 ? std::pow(0.01 * value_deviation() * 288 / (4.5 * expected), 0.25) : kInfinity;
+  const double expected = realisation_->expected_fourth_derivative(line.direction),
+               deviation = std::sqrt(plan.covariance->variance());
+  step_ = expected > 0 ? std::pow(0.01 * deviation * 288 / ((4.5 + added_norm_) * expected), 0.25)
+                       : kInfinity;
 }
 
 void RealisationPath::draw(Rng& rng, Counters& counters) {
   if (drawn_) return;
   drawn_ = true;
   realisation_->draw(kept_ ? kept_->seed : rng(), plan_->process->time);
-  if (kept_) entry_ = kept_->entry;
+  if (kept_) {
+    if (kept_->entry.active && kept_->entry.block < 0) kept_->entry.solve(plan_->posterior.get());
+    entry_ = kept_->entry;
+  }
   realisation_->set_line(line_.origin, line_.direction);
   // The cubic is off by u²(h-u)² |g''''| / 24 <= (4/3)(B₁+B₂) (h/2)⁴ |g''''| / 24; 4.5 standard
   // deviations of g''''.
-  deviation_ = 4.5 * realisation_->fourth_derivative() / 288;
+  deviation_ = (4.5 * realisation_->fourth_derivative() +
+                added_norm_ * realisation_->expected_fourth_derivative(line_.direction)) /
+               288;
   count(counters);
 }
 
@@ -74,19 +94,11 @@ void RealisationPath::count(Counters& counters) {
   counted_ = realisation_->normals();
 }
 
-// G = Cov ∇g at a point (definitions E3).
-Mat3 RealisationPath::derivative_covariance(const Vec3& x) const {
-  const LocalPoint at = plan_->covariance->at(x);
-  const Eigen::Matrix4d block = plan_->covariance->block(at, at);
-  Mat3 g;
-  for (int i = 0; i < 3; ++i) g.row[i] = {block(1 + i, 1), block(1 + i, 2), block(1 + i, 3)};
-  return g;
-}
-
-void RealisationPath::slope_law(double, double& mean, double& deviation) const {
-  const Vec3& d = line_.direction;
-  mean = 0;
-  deviation = std::sqrt(dot(d, derivative_covariance(point(anchor_)) * d));
+void RealisationPath::slope_law(double g0, double& mean, double& deviation) const {
+  const Eigen::Vector4d d = row(0, line_.direction);
+  const double shared = law_.row(0).dot(d), gain = law_(0, 0) > 0 ? shared / law_(0, 0) : 0;
+  mean = sign_ * mean_.dot(d) + gain * (g0 - sign_ * mean_[0]);
+  deviation = std::sqrt(std::max(0.0, d.dot(law_ * d) - gain * shared));
 }
 
 void RealisationPath::start_free(Rng& rng, Counters& counters, double& g, double& dg) {
@@ -115,42 +127,55 @@ double RealisationPath::start(const PathStart& known, Rng& rng, Counters& counte
   }
   double mean, deviation;
   slope_law(known.value, mean, deviation);
-  pull_ = std::max(0.0, -known.value) +
-          (deviation > 0 ? 0.61 * std::max(0.0, -dg) * value_deviation() / deviation : 0);
+  pull_ = plan_->pull() + std::max(0.0, -known.value) +
+          (deviation > 0
+               ? 0.61 * std::max(0.0, -dg) * std::sqrt(plan_->covariance->variance()) / deviation
+               : 0);
   return dg;
 }
 
-// The value and the slopes at one point are independent: the variance is the same everywhere.
 RealisationCondition RealisationPath::condition(const PathStart& known) const {
-  RealisationCondition out{true, point(anchor_), {0, {}}};
+  RealisationCondition out{true, point(anchor_), {0, {}}, -1, {}};
   const FieldSample now = sample(out.at);
-  // Of g itself, which a ray inside the body sees reversed.
-  out.weight.value = sign_ * (known.value - now.value) / plan_->covariance->variance();
-  if (!known.slope_known) return out;
-  const Mat3 g = derivative_covariance(out.at);
+  // What is known, as rows over (g, ∇g); of g itself, which a ray inside the body sees reversed.
+  std::vector<Eigen::Vector4d> rows{row(1, {})};
+  std::vector<double> off{known.value - now.value};
+  const auto tell = [&](const Vec3& d, double slope) {
+    rows.push_back(row(0, d));
+    off.push_back(slope - dot(now.gradient, d));
+  };
   if (known.gradient_known) {
-    out.weight.slope = pseudo_inverse(g) * (known.gradient - now.gradient) * sign_;
-  } else {
-    const Vec3& d = line_.direction;
-    const double variance = dot(d, g * d);
-    if (variance > 0)
-      out.weight.slope = d * (sign_ * (known.slope - dot(now.gradient, d)) / variance);
+    tell({1, 0, 0}, known.gradient.x);
+    tell({0, 1, 0}, known.gradient.y);
+    tell({0, 0, 1}, known.gradient.z);
+  } else if (known.slope_known) {
+    tell(line_.direction, known.slope);
   }
+  const auto n = static_cast<Eigen::Index>(rows.size());
+  Eigen::MatrixXd f(n, 4);
+  Eigen::VectorXd delta(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    f.row(i) = rows[i];
+    delta[i] = sign_ * off[i];
+  }
+  const Eigen::Vector4d weight = f.transpose() * (pseudo_inverse(f * law_ * f.transpose()) * delta);
+  out.weight = {weight[0], {weight[1], weight[2], weight[3]}};
+  out.solve(plan_->posterior.get());
   return out;
 }
 
 FieldSample RealisationPath::sample(const Vec3& x) const {
   FieldSample g = realisation_->sample(x);
-  entry_.add(*plan_->covariance, x, g);
-  own_.add(*plan_->covariance, x, g);
+  entry_.add(*plan_->covariance, plan_->posterior.get(), x, g);
+  own_.add(*plan_->covariance, plan_->posterior.get(), x, g);
   return {sign_ * g.value, g.gradient * sign_};
 }
 
 void RealisationPath::evaluate(double t, double& g, double& dg) {
   realisation_->on_line(t, g, dg);
   FieldSample moved;
-  entry_.add(*plan_->covariance, point(t), moved);
-  own_.add(*plan_->covariance, point(t), moved);
+  entry_.add(*plan_->covariance, plan_->posterior.get(), point(t), moved);
+  own_.add(*plan_->covariance, plan_->posterior.get(), point(t), moved);
   g = sign_ * (g + moved.value);
   dg = sign_ * (dg + dot(moved.gradient, line_.direction));
 }

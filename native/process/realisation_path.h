@@ -21,6 +21,8 @@ class RealisationPath {
     double correlation_error = 3e-7;
     std::shared_ptr<const GaussianProcess> process;
     std::shared_ptr<const Covariance> covariance;
+    PosteriorPtr posterior;  // null: no conditions
+    double pull() const { return posterior ? posterior->pull() : 0; }
   };
 
   // The lines from here on are drawn from this realisation; null: from a fresh one each. `inside`:
@@ -33,8 +35,9 @@ class RealisationPath {
   void reset(const Plan& plan, const LineGeometry& line, double anchor, double t_end,
              Counters& counters);
   double step() const { return step_; }
-  double value_deviation() const { return std::sqrt(plan_->covariance->variance()); }
-  void slope_law(double, double& mean, double& deviation) const;
+  double value_mean() const { return sign_ * mean_[0]; }
+  double value_deviation() const { return std::sqrt(law_(0, 0)); }
+  void slope_law(double g0, double& mean, double& deviation) const;
   void start_free(Rng& rng, Counters& counters, double& g, double& dg);
   double start(const PathStart& known, Rng& rng, Counters& counters);
   double pull(double) const { return pull_; }
@@ -55,7 +58,6 @@ class RealisationPath {
   void count(Counters& counters);
   RealisationCondition condition(const PathStart& known) const;
   void evaluate(double t, double& g, double& dg);
-  Mat3 derivative_covariance(const Vec3& x) const;
   Vec3 point(double t) const { return line_.origin + line_.direction * t; }
 
   const Plan* plan_ = nullptr;
@@ -64,10 +66,13 @@ class RealisationPath {
   RealisationMemory* kept_ = nullptr;
   double kept_sign_ = 1, sign_ = 1;  // of the next line, and of this one
   LineGeometry line_;
-  double anchor_ = 0, step_ = 1, deviation_ = 0, pull_ = 0;
+  double anchor_ = 0, step_ = 1, deviation_ = 0, pull_ = 0, added_norm_ = 0;
   bool drawn_ = false;
   std::uint64_t counted_ = 0;
 
+  // Of (g, ∇g) at the anchor, given the conditions.
+  Eigen::Vector4d mean_;
+  Eigen::Matrix4d law_;
   RealisationCondition entry_, own_;  // of the realisation that is kept, and of this line alone
 };
 

@@ -41,6 +41,7 @@ class SpectralPath {
              Counters& counters);
 
   double step() const { return step_; }
+  double value_mean() const { return 0; }
   double value_deviation() const { return std::sqrt(plan_->variance); }
   void slope_law(double, double& mean, double& deviation) const {
     mean = 0;  // value and slope of a stationary process are independent at a point

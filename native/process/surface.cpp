@@ -3,6 +3,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "process/joint_line.h"
 #include "process/line_impl.h"
 #include "process/plan.h"
 #include "process/realisation_path.h"
@@ -20,6 +21,10 @@ void Line::stop_when(const std::atomic<bool>* stop) {
 namespace {
 
 Sampler sampler_for(Memory memory, Sampler sampler) {
+  if (memory == Memory::segments && (memory.count < 1 || memory.count > Memory::kMostSegments))
+    throw std::invalid_argument("memory 'global-n' keeps 1 to " +
+                                std::to_string(Memory::kMostSegments) + " segments, not " +
+                                std::to_string(memory.count) + ".");
   if (memory != Memory::global) return sampler;
   if (sampler != Sampler::automatic && sampler != Sampler::realisation)
     throw std::invalid_argument(
@@ -37,8 +42,8 @@ ProcessSurface::ProcessSurface(std::shared_ptr<const GaussianProcess> process,
       memory_(memory),
       sampler_(sampler_for(memory, sampler)),
       missed_root_(missed_root),
-      planned_(
-          std::make_shared<PlannedLine>(plan_line(std::move(process), sampler_, missed_root))) {
+      planned_(std::make_shared<PlannedLine>(
+          plan_line(std::move(process), memory, sampler_, missed_root))) {
   const double volume = determinant(object_to_world.linear);
   if (!std::isfinite(volume) || std::abs(volume) < 1e-300)
     throw std::invalid_argument(
@@ -59,7 +64,7 @@ ProcessSurface::ProcessSurface(std::shared_ptr<const GaussianProcess> process,
 void ProcessSurface::serve_inside() {
   if (planned_inside_) return;
   planned_inside_ = std::make_shared<PlannedLine>(
-      plan_line(inside_out(*planned_->process), sampler_, missed_root_));
+      plan_line(inside_out(*planned_->process), memory_, sampler_, missed_root_));
 }
 
 double ProcessSurface::first_hit(Line& line, const Ray& ray, double t_max, const Start& start,
@@ -80,10 +85,13 @@ double ProcessSurface::first_hit(Line& line, const Ray& ray, double t_max, const
     return kInfinity;
   }
   if (memory_ == Memory::global) l.path<RealisationPath>().keep(start.realisation, start.inside);
+  JointLine* joint = memory_ == Memory::segments ? l.plan->line_sampler->joint(l) : nullptr;
+  if (joint) joint->recall(start.segments, start.inside ? -1 : 1);
   Start seen = start;
   if (start.inside) seen.state = {-start.state.value, -start.state.gradient};
   const double t = l.plan->line_sampler->first_hit(*l.plan, l, t_begin, t_end, seen, rng, counters);
   if (memory_ == Memory::global) l.path<RealisationPath>().keep(nullptr, false);
+  if (joint) joint->recall(nullptr, start.inside ? -1 : 1);
   return t;
 }
 
@@ -159,16 +167,46 @@ Vec3 ProcessSurface::world_gradient(const State& state) const {
 }
 
 Start ProcessSurface::start_from(const State* remembered, bool inside,
-                                 RealisationMemory* realisation) const {
-  const Start fresh{Start::Kind::outside, {}, inside, realisation};
+                                 RealisationMemory* realisation,
+                                 const SegmentMemory* segments) const {
+  const Start fresh{Start::Kind::outside, {}, inside, realisation, segments};
   if (!remembered) return fresh;
   // A certain surface has nothing to forget (B2): the ray starts on it and leaves along its
   // gradient.
   if (planned_->sigma_max == 0 || memory_ == Memory::global)
-    return {Start::Kind::value_slope, *remembered, inside, realisation};
+    return {Start::Kind::value_slope, *remembered, inside, realisation, segments};
   if (memory_ == Memory::none) return fresh;
   if (memory_ == Memory::renewal) return {Start::Kind::value, *remembered, inside, realisation};
-  return {Start::Kind::value_slope, *remembered, inside, realisation};
+  return {Start::Kind::value_slope, *remembered, inside, realisation, segments};
+}
+
+void ProcessSurface::keep_segment(Line& line, double t, SegmentMemory& segments) const {
+  Line::Impl& l = line.impl();
+  Line::Impl& drawn = l.shared ? *l.shared : l;
+  if (drawn.stretches.empty()) return;
+  const JointLine* joint = drawn.plan->line_sampler->joint(drawn);
+  if (!joint) return;  // a certain surface
+  std::vector<SegmentMemory::Row> rows;
+  joint->record(t, rows);
+  segments.keep(std::move(rows), memory_.count);
+}
+
+void ProcessSurface::keep_end(const Vec3& world_position, const State& state,
+                              SegmentMemory& segments) const {
+  if (segments.segments.empty()) return;
+  const Vec3 at = world_to_object_.point(world_position);
+  const FieldSample mean = planned_->process->mean->sample(at),
+                    sigma = planned_->process->sigma->sample(at);
+  if (!(sigma.value > 0)) return;
+  const double g = (state.value - mean.value) / sigma.value;
+  const Vec3 slope = (state.gradient - mean.gradient - sigma.gradient * g) / sigma.value;
+  std::vector<SegmentMemory::Row>& rows = segments.segments.back();
+  rows.push_back({at, {}, g, 0});
+  for (int i = 0; i < 3; ++i) {
+    Functional along{0, {}};
+    along.slope[i] = 1;
+    rows.push_back({at, along, slope[i], 0});
+  }
 }
 
 std::vector<std::pair<std::string, std::string>> ProcessSurface::plan() const {
@@ -177,19 +215,28 @@ std::vector<std::pair<std::string, std::string>> ProcessSurface::plan() const {
     text << v;
     return text.str();
   };
-  const char* memories[] = {"none", "renewal", "renewal+",
+  const std::string segments = "global-" + std::to_string(memory_.count) +
+                               ": the last segments on which the process was drawn";
+  const char* memories[] = {"none", "renewal", "renewal+", segments.c_str(),
                             "global: one realisation for the whole path and its shadow rays"};
   const Range sigma = planned_->process->sigma->range();
   std::vector<std::pair<std::string, std::string>> facts = {
       {"sampler", planned_->sampler_reason},
       {"correlation_error", number(planned_->line_sampler->correlation_error())},
-      {"memory", memories[static_cast<int>(memory_)]},
+      {"memory", memories[memory_.kind]},
       {"sigma", sigma.min == sigma.max
                     ? "constant " + number(sigma.min)
                     : "varies, " + number(sigma.min) + " to " + number(sigma.max)},
       {"certainly_absent", "where the mean exceeds " + number(planned_->skip_threshold) + " (" +
                                number(planned_->skip_deviations) +
                                " standard deviations): nothing is drawn"}};
+  if (const auto posterior = planned_->line_sampler->posterior())
+    facts.push_back(
+        {"conditions", std::to_string(posterior->conditions().points()) + " points, " +
+                           std::to_string(posterior->conditions().rows().size()) +
+                           " values and slopes in " + std::to_string(posterior->blocks()) +
+                           " blocks, solved with a truncation error of " +
+                           number(posterior->truncation_error()) + " standard deviations"});
   if (planned_->process->time)
     facts.push_back(
         {"time", "now " + number(*planned_->process->time) +

@@ -15,6 +15,7 @@
 namespace gpis {
 
 struct RealisationMemory;
+struct SegmentMemory;
 struct PlannedLine;  // tables and function pointers chosen once per object (process/plan.h)
 
 // f and ∇f (object space) at a point: what Renewal+ remembers. Renewal uses the value alone.
@@ -38,6 +39,8 @@ struct Start {
   // The realisation that the ray is to see; null: a fresh path. Memory `global` alone, which takes
   // note here where the path entered it.
   RealisationMemory* realisation = nullptr;
+  // What the ray knows of earlier segments; null: nothing. Memory `segments` alone.
+  const SegmentMemory* segments = nullptr;
 };
 
 // Gradient at a point of a line, given the line sample (t, ∂_d f): ∇f = mean + ξ₁ b1 + ξ₂ b2, ξ iid
@@ -113,7 +116,13 @@ class ProcessSurface {
   // The start of a ray that leaves a point with this remembered state, under this object's memory
   // model.
   Start start_from(const State* remembered, bool inside = false,
-                   RealisationMemory* realisation = nullptr) const;
+                   RealisationMemory* realisation = nullptr,
+                   const SegmentMemory* segments = nullptr) const;
+
+  // Under memory `segments`: keeps the line of the last first_hit up to t as the newest segment;
+  // and the state (object space) at a point where that segment ends.
+  void keep_segment(Line& line, double t, SegmentMemory& segments) const;
+  void keep_end(const Vec3& world_position, const State& state, SegmentMemory& segments) const;
 
   // Human-readable facts for scene.plan().
   std::vector<std::pair<std::string, std::string>> plan() const;

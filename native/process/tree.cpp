@@ -70,6 +70,11 @@ TreePtr ProcessTree::combine(Kind kind, const std::vector<TreePtr>& parts, bool 
         refuse("", name, " with shared_noise=True takes operands of one kernel; these have ",
                tree->leaves_[0].process->kernel->describe(), " and ",
                leaf.process->kernel->describe(), ".");
+    for (const Leaf& leaf : tree->leaves_)
+      if (leaf.process->conditions && tree->leaves_.size() > 1)
+        refuse("", name,
+               " with shared_noise=True takes operands without conditions: what is known "
+               "of one would be known of all.");
     tree->noises_ = 1;
     top.noise = 0;
   }

@@ -116,8 +116,8 @@ void TreeLines::look_ahead(Leaf& l, double a, const LeafPoint& here) {
   l.looked = true;
   // Right after a start the value and slope it was told may hold f off where the prior alone says
   // (B13).
-  const double threshold =
-      l.plan->skip_threshold + (n.begun ? l.plan->sigma_max * n.path->pull(a) : 0);
+  const double pull = n.begun ? n.path->pull(a) : l.plan->condition_pull;
+  const double threshold = l.plan->skip_threshold + l.plan->sigma_max * pull;
   if (!here.known || here.mean > threshold) {
     const double clear = l.mean->above_until(a, l.t_end, threshold);
     if (clear >= l.t_end) return certainly(positive, kInfinity);
@@ -125,7 +125,8 @@ void TreeLines::look_ahead(Leaf& l, double a, const LeafPoint& here) {
   }
   // Certainly inside: of use where the leaf is subtracted or intersected. Behind its bounds it is
   // absent. `pull` tells nothing of values held up: only without a start of its own.
-  if (n.conditioned || !(l.mean_slope < kInfinity) || (here.known && here.mean > -threshold))
+  if (n.conditioned || l.plan->condition_pull > 0 || !(l.mean_slope < kInfinity) ||
+      (here.known && here.mean > -threshold))
     return;
   const Field& mean = *l.plan->process->mean;
   const double inside = above_by_lipschitz(

@@ -27,6 +27,13 @@ double log_normal_between(double low, double high) {
   return std::log1p(-std::exp(log_normal_tail(-low)) - std::exp(log_normal_tail(high)));
 }
 
+// ln P(low < g < high) at the anchor of a path.
+double log_mass(const LineNoise& path, double low, double high) {
+  const double mean = path.value_mean(), deviation = path.value_deviation();
+  if (!(deviation > 0)) return low < mean && mean < high ? 0 : -kInfinity;
+  return log_normal_between((low - mean) / deviation, (high - mean) / deviation);
+}
+
 }  // namespace
 
 void TreeMarch::start(std::span<const Start> starts) {
@@ -133,7 +140,7 @@ void TreeMarch::engage(int leaf, double a) {
 void TreeMarch::begin(int noise, double a) {
   Noise& n = lines_.noises[noise];
   lines_.reset_noise(n, a);
-  const double deviation = n.path->value_deviation();
+  const double mean = n.path->value_mean(), deviation = n.path->value_deviation();
   TreeSample::NoisePoint& p = from_.noise[noise];
   p.known = true;
   n.path->start_free(*rng_, *counters_, p.g, p.dg);
@@ -145,9 +152,10 @@ void TreeMarch::begin(int noise, double a) {
     const double low = part > 0 ? cuts[part - 1].g : -kInfinity;
     const double high = part < static_cast<int>(cuts.size()) ? cuts[part].g : kInfinity;
     // A draw that is in the part already follows its law.
-    if (part >= 0 && !(p.g > low && p.g < high)) {
+    if (part >= 0 && deviation > 0 && !(p.g > low && p.g < high)) {
       PathStart known;
-      known.value = deviation * truncated_normal(low / deviation, high / deviation, *rng_);
+      known.value = mean + deviation * truncated_normal((low - mean) / deviation,
+                                                        (high - mean) / deviation, *rng_);
       ++counters_->truncated_normals;
       p.g = known.value;
       p.dg = n.path->start(known, *rng_, *counters_);
@@ -209,7 +217,7 @@ int TreeMarch::choose_part(int noise, double a, double g, const std::vector<Cut>
   if (possible == 0 || sure == parts) return -1;
   if (possible == 1) return last;
 
-  const double deviation = lines_.noises[noise].path->value_deviation();
+  const LineNoise& path = *lines_.noises[noise].path;
   std::vector<double> weight(parts);
   double best = -kInfinity;
   const std::vector<int> known = known_;
@@ -218,8 +226,7 @@ int TreeMarch::choose_part(int noise, double a, double g, const std::vector<Cut>
     for (const Cut& cut : cuts) known_[cut.leaf] = sign_in(cuts, part, cut.leaf);
     const double low = part > 0 ? cuts[part - 1].g : -kInfinity;
     const double high = part + 1 < parts ? cuts[part].g : kInfinity;
-    weight[part] =
-        log_normal_between(low / deviation, high / deviation) + odds(tree_->root(), a).above;
+    weight[part] = log_mass(path, low, high) + odds(tree_->root(), a).above;
     best = std::max(best, weight[part]);
   }
   known_ = known;
@@ -263,7 +270,6 @@ TreeMarch::Odds TreeMarch::odds(int node, double a) {
     return odds(node, a);
   }
   lines_.reset_noise(noise, a);
-  const double deviation = noise.path->value_deviation();
   std::vector<Cut> cuts;
   const std::vector<int> known = known_;
   find_cuts(n.noise, a, cuts);
@@ -271,7 +277,7 @@ TreeMarch::Odds TreeMarch::odds(int node, double a) {
   for (int part = 0; part <= static_cast<int>(cuts.size()); ++part) {
     const double low = part > 0 ? cuts[part - 1].g : -kInfinity;
     const double high = part < static_cast<int>(cuts.size()) ? cuts[part].g : kInfinity;
-    const double mass = log_normal_between(low / deviation, high / deviation);
+    const double mass = log_mass(*noise.path, low, high);
     const int s = tree_->sign(
         node, [&](int i) { return known_[i] != 0 ? known_[i] : sign_in(cuts, part, i); });
     double& side = s > 0 ? sum.above : sum.below;

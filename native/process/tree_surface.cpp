@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 
+#include "process/joint_line.h"
 #include "process/realisation_path.h"
 
 namespace gpis {
@@ -68,10 +69,17 @@ TreeHit TreeSurface::first_hit(TreeMarch& march, std::span<Line> lines, const Ra
     for (std::size_t k = 0; k < lines.size() && kept; ++k)
       lines[k].impl().path<RealisationPath>().keep(now ? starts[k].realisation : nullptr, false);
   };
+  const auto recall = [&](bool now) {
+    for (std::size_t k = 0; k < lines.size() && memory() == Memory::segments; ++k)
+      if (JointLine* joint = plans_[k]->line_sampler->joint(lines[k].impl()))
+        joint->recall(now ? starts[k].segments : nullptr, 1);
+  };
   keep(true);
+  recall(true);
   const TreeHit hit =
       march.first_hit(tree, plans_, geometry, lines, t_max, starts, kept, rng, counters);
   keep(false);
+  recall(false);
   return hit;
 }
 

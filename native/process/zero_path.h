@@ -21,6 +21,7 @@ class ZeroPath {
     step_ = 0.5 * plan.length / length(line.direction);
   }
   double step() const { return step_; }
+  double value_mean() const { return 0; }
   double value_deviation() const { return 0; }
   void slope_law(double, double& mean, double& deviation) const { mean = deviation = 0; }
   void start_free(Rng&, Counters&, double& g, double& dg) { g = dg = 0; }

@@ -97,6 +97,7 @@ def values(tmp_path_factory):
         "TensorField": gn.TensorGridField(tensors, 0.5),
         "a": 0.1,
         "GaussianProcess.anisotropy": None,
+        "GaussianProcess.conditions": {"points": [(0, 0, 1)], "values": [0.0]},
         "inside": None,
         "PaintedFields": gn.PaintedFields(folder / "field.vdb"),
         "PaintedFields.apply.channel": "albedo",
