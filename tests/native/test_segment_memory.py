@@ -1,0 +1,149 @@
+"""Memory global-n (definitions B11): a ray knows g on the last n segments of its path, so that it approaches one realisation
+for the whole path (memory global) as n grows."""
+
+import gpis_native as gn
+import numpy as np
+import pytest
+from statistics_checks import check_same_distribution
+
+pytestmark = pytest.mark.stats
+
+BOX = ([-3, -3, -3], [3, 3, 3])
+ROUGH = gn.GaussianProcess(gn.SphereField((0, 0, 0), 1), 0.3, gn.SquaredExponential(0.4), bounds=BOX)
+MATERN = gn.GaussianProcess(gn.SphereField((0, 0, 0), 1), 0.3, gn.Matern(2.5, 0.5), bounds=BOX)
+
+
+def take(state, rows):
+    """The state of some rows of a first_hits result."""
+    out = {key: value[rows] for key, value in state.items() if key in ("value", "gradient")}
+    if "realisation" in state:
+        out["realisation"] = {key: value[rows] for key, value in state["realisation"].items()}
+    if "segments" in state:
+        kept = state["segments"]
+        number = np.full(len(state["value"]), -1)
+        number[rows] = np.arange(len(np.flatnonzero(rows) if rows.dtype == bool else rows))
+        chosen = number[kept["row"]] >= 0
+        out["segments"] = {key: value[chosen] for key, value in kept.items()}
+        out["segments"]["row"] = number[out["segments"]["row"]]
+    return out
+
+
+def bounce(gp, memory, hits, directions, seed):
+    """Rays that leave hits in the same given directions, mirrored where those point into the surface."""
+    gradient = hits["gradient"]
+    along = np.sum(directions * gradient, axis=1, keepdims=True) / np.sum(gradient**2, axis=1, keepdims=True)
+    out = directions - 2 * np.minimum(along, 0) * gradient
+    return gn.first_hits(gp, hits["position"], out, 10, memory=memory, start=hits["state"], seed=seed), out
+
+
+def chain(gp, memory, n, seed):
+    """t of the four segments of paths to and fro in a cave, between walls that later segments meet again."""
+    turns = np.array([[0.0, 0, -1.0], [0.1, 0, 1.0], [0.0, 0.1, -1.0], [-0.1, 0.1, 1.0]])
+    turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+    t = np.full((4, n), np.inf)
+    directions = np.tile(turns[0], (n, 1))
+    hits = gn.first_hits(gp, np.zeros((n, 3)), directions, 10, memory=memory, seed=seed)
+    for k in range(4):
+        t[k] = hits["t"]
+        if k < 3:
+            hits, directions = bounce(gp, memory, hits, np.tile(turns[k + 1], (n, 1)), seed + 1 + k)
+    assert np.isfinite(t).all()
+    return t
+
+
+def test_the_way_back_is_free():
+    """A ray that turns round knows its line, so nothing is there; under Renewal+ something may be."""
+    n = 2000
+    o, d = np.tile([0.5, 0.0, 3.0], (n, 1)), np.tile([0.0, 0, -1.0], (n, 1))
+    for gp in (ROUGH, MATERN):
+        back = {}
+        for memory in ("renewal+", "global-1"):
+            first = gn.first_hits(gp, o, d, 10, memory=memory, seed=3)
+            hit = np.isfinite(first["t"])
+            state = take(first["state"], hit)
+            again = gn.first_hits(gp, first["position"][hit], -d[hit], 10, memory=memory, start=state, seed=4)
+            back[memory] = np.isfinite(again["t"]).mean()
+        assert back["global-1"] == 0
+        assert back["renewal+"] > 0.02
+
+
+@pytest.mark.parametrize("kernel", [gn.SquaredExponential(0.4), gn.Matern(2.5, 0.5)], ids=["se", "matern 5/2"])
+def test_many_segments_are_one_realisation(kernel, seed, full_size):
+    """Every segment against memory global; Renewal+ differs, so the test can fail."""
+    n = 20_000 if full_size else 2500
+    cave = gn.GaussianProcess(-1 * gn.SphereField((0, 0, 0), 1), 0.2, kernel, bounds=BOX)
+    known = chain(cave, "global-8", n, seed)
+    whole = chain(cave, "global", n if full_size else n // 3, seed + 50)
+
+    def compare(a, b):
+        for k in range(4):
+            check_same_distribution(a[k], b[k], f"segment {k}")
+        # The walls stand still: up and down again, and up again.
+        check_same_distribution(a[2] - a[1], b[2] - b[1], "third less second")
+        check_same_distribution(a[3] - a[1], b[3] - b[1], "fourth less second")
+
+    compare(known, whole)
+    with pytest.raises(AssertionError):
+        compare(chain(cave, "renewal+", n, seed + 90), known)
+
+
+def test_segments_are_forgotten_one_by_one(seed):
+    n = 300
+    for count in (1, 2):
+        memory = f"global-{count}"
+        hits = gn.first_hits(ROUGH, np.tile([0.5, 0, 3.0], (n, 1)), np.tile([0.0, 0, -1], (n, 1)), 10, memory=memory, seed=seed)
+        for k in range(3):
+            assert set(hits["state"]["segments"]["segment"]) == set(range(min(k + 1, count)))
+            hit = np.isfinite(hits["t"])
+            hits = {"position": hits["position"][hit], "gradient": hits["gradient"][hit], "state": take(hits["state"], hit)}
+            hits, _ = bounce(ROUGH, memory, hits, np.tile([0.0, 0.6, 0.8], (hit.sum(), 1)), seed + k)
+            if not np.isfinite(hits["t"]).any():
+                break
+
+
+def test_what_is_kept_is_what_was_drawn(seed):
+    """The rows of a segment hold f on its line: 0 and the gradient at the hit."""
+    n = 50
+    hits = gn.first_hits(ROUGH, np.tile([0.2, 0, 3.0], (n, 1)), np.tile([0.0, 0, -1], (n, 1)), 10, memory="global-3", seed=seed)
+    kept = hits["state"]["segments"]
+    for i in np.flatnonzero(np.isfinite(hits["t"])):
+        rows = np.flatnonzero(kept["row"] == i)
+        at = kept["position"][rows]
+        assert np.allclose(at[:, :2], [0.2, 0]) and at[:, 2].min() >= hits["position"][i, 2] - 1e-9
+        value = ROUGH.mean(at) + 0.3 * kept["value"][rows]
+        values = kept["functional"][rows][:, 0] == 1
+        before = values & (at[:, 2] > hits["position"][i, 2] + 1e-9)
+        assert np.all(value[before] > 0)
+        at_hit = values & ~before
+        assert np.allclose(value[at_hit], 0, atol=1e-9)
+
+
+def test_a_mirror_and_a_tree_keep_the_furnace(seed):
+    eye = np.eye(4)
+    eye[2, 3] = 4
+    other = gn.GaussianProcess(gn.SphereField((0.4, 0, 0.6), 0.5), 0.1, gn.SquaredExponential(0.3), bounds=BOX)
+    for process, material in ((ROUGH, "mirror"), (MATERN, "lambert"), (gn.difference(ROUGH, other), "lambert")):
+        leaves = 2 if process is not ROUGH and process is not MATERN else 1
+        scene = {
+            "version": 1,
+            "camera": {"type": "perspective", "matrix": eye, "fov_x": 0.6},
+            "world": {"color": (1, 1, 1)},
+            "materials": {"m": {"type": material, "color": (1, 1, 1)}},
+            "objects": [{"name": "A", "type": "gpis", "process": process, "materials": ["m"] * leaves, "memory": "global-2"}],
+        }
+        result = gn.render(gn.Scene(scene), 6, 6, samples=16, seed=seed)
+        assert np.allclose(result.passes["combined"], 1, atol=1e-6)
+        for name in ("nan_samples", "line_step_limit", "states_inside", "path_length_limit"):
+            assert result.stats[name] == 0
+
+
+def test_other_counts_and_samplers_are_refused():
+    rays = np.array([[0, 0, 3.0]]), np.array([[0, 0, -1.0]])
+    for memory in ("global-0", "global-65", "global-x", "global-", "global-2 "):
+        with pytest.raises(ValueError, match="'global-1' to 'global-64'"):
+            gn.first_hits(ROUGH, *rays, 5, memory=memory)
+    with pytest.raises(ValueError, match="global-n"):
+        gn.first_hits(ROUGH, *rays, 5, memory="global-2", sampler="convolution")
+    with pytest.raises(ValueError, match=r"start\['segments'\] must be"):
+        start = {"value": np.zeros(1), "gradient": np.array([[0, 0, 1.0]]), "segments": {"row": [0]}}
+        gn.first_hits(ROUGH, *rays, 5, memory="global-2", start=start)
