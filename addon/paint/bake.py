@@ -17,7 +17,7 @@ from .. import volume
 from ..bake import files
 from ..native import native
 from . import stroke as strokes
-from .stroke import Stroke
+from .stroke import Brush, Stroke
 
 # Grids as they are in a file: (path, what the object says of it) -> native PaintedFields. The last two: two objects are
 # painted in turns, no more.
@@ -123,6 +123,7 @@ class Painting:
         self.stroke = Stroke(brush)
         self.fields = fields(obj)
         forget()  # what a stroke that fails leaves behind is nobody's
+        self._before = _in_use(obj.data.gpis_strokes, brush.channel, self.fields.painted())
         self.counts = {}
 
     def add(self, dabs):
@@ -135,11 +136,23 @@ class Painting:
     def finish(self):
         """Bake the stroke; what it changed, as counts."""
         if len(self.stroke.dabs) or self.stroke.brush.operation in strokes.WHOLE:
-            commit(self.object, self.fields, strokes.appended(self.object.data.gpis_strokes, self.stroke))
+            commit(self.object, self.fields, strokes.appended(self._before, self.stroke))
         return self.counts
 
     def cancel(self):
         self.fields = None
+
+
+# Layer -> the first of its grids, those that a file always has left out.
+_GRIDS = {"deviation": "sigma", "anisotropy": volume.ANISOTROPY_GRIDS[0], "albedo": "albedo"}
+
+
+def _in_use(text, channel, painted):
+    """The strokes without those of a channel that begins anew, as the object was given a constant in its place."""
+    layer = layer_of(channel)
+    if not text or layer not in _GRIDS or _GRIDS[layer] in painted:
+        return text
+    return "\n".join(stroke.to_line() for stroke in strokes.read(text) if layer_of(stroke.brush.channel) != layer)
 
 
 def paint(opened, stroke, copied=None):
@@ -150,6 +163,9 @@ def paint(opened, stroke, copied=None):
     if brush.operation == "mirror":
         axis, from_positive = brush.value
         return opened.mirror(brush.channel, int(axis), bool(from_positive))
+    if brush.operation == "extend":
+        opened.extend(np.reshape(brush.value, (2, 3)))
+        return {}
     if brush.operation == "copy":
         return opened.copy(copied, brush.channel) if copied is not None else {}
     counts = {}
@@ -214,6 +230,14 @@ def _wanted(opened, brush, dabs, i):
     return box if np.any(box[0] < low) or np.any(box[1] > high) else None
 
 
+def extend(obj, by):
+    """`by` more room on all sides of an object's grids."""
+    low, high = np.array(fields(obj).bounds())
+    painting = Painting(obj, Brush("mean", "extend", value=(*(low - by), *(high + by))))
+    paint(painting.fields, painting.stroke)
+    painting.finish()
+
+
 def commit(obj, opened, text):
     """Write native fields to a new version of the object's file, and give it that and the strokes."""
     data = obj.data
@@ -248,19 +272,25 @@ def replayed(opened, text):
     all_strokes = strokes.read(text)
     for i, stroke in enumerate(all_strokes):
         # A channel that was copied from elsewhere starts there.
-        if not any(later.brush.operation == "copy" and _layer(later) == _layer(stroke) for later in all_strokes[i:]):
+        layer = layer_of(stroke.brush.channel)
+        later = (other.brush for other in all_strokes[i:])
+        copied = any(brush.operation == "copy" and layer_of(brush.channel) == layer for brush in later)
+        if stroke.brush.operation == "extend" or not copied:
             paint(opened, stroke)
 
 
-def _layer(stroke):
+def layer_of(channel):
     """Length scale and anisotropy are one tensor."""
-    return "anisotropy" if stroke.brush.channel == "length_scale" else stroke.brush.channel
+    return "anisotropy" if channel == "length_scale" else channel
 
 
 def rebase(obj):
     """Paint the object's strokes on a file that was made without them: its mesh was baked again."""
-    text = obj.data.gpis_strokes
+    # The new file has the room that it needs.
+    kept = [stroke for stroke in strokes.read(obj.data.gpis_strokes) if stroke.brush.operation != "extend"]
+    text = "\n".join(stroke.to_line() for stroke in kept)
     if not text:
+        obj.data.gpis_strokes = ""
         return
     check(obj)
     try:

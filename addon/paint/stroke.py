@@ -25,7 +25,7 @@ OPERATIONS = {
     "condition": ("pin", "erase"),
 }
 # Operations on a whole channel, without dabs.
-WHOLE = ("reset", "mirror", "copy")
+WHOLE = ("reset", "mirror", "copy", "extend")
 # Operations whose dabs have a direction.
 DIRECTED = ("grab", "comb")
 FALLOFFS = ("smooth", "smoother", "sphere", "root", "sharp", "sharper", "inverse_square", "linear", "constant")
