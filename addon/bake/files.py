@@ -111,7 +111,12 @@ def adopt(blend_path):
 
 
 def restore():
-    """Give volumes whose file is missing, but packed, a file again; the next save adopts it."""
+    """Give volumes their files again: in the folder of this .blend wherever it was moved or copied to, and where they
+    are missing, but packed, in a temporary one, which the next save adopts."""
+    for volume, path in _baked():
+        beside = folder(bpy.data.filepath) / path.name
+        if path != beside and beside.is_file():
+            point(volume, beside)
     for volume in bpy.data.volumes:
         path = bpy.path.abspath(volume.filepath, library=volume.library)
         if volume.packed_file and not volume.is_sequence and not os.path.isfile(path):

@@ -85,23 +85,39 @@ class _OnObject:
 class GPIS_OT_paint_stroke(_OnObject, bpy.types.Operator):
     """Paint a stroke on the active GPIS object"""
 
+    # No property is saved: a script gets the defaults, not what a hand painted with last.
     bl_idname = "gpis.paint_stroke"
     bl_label = "Paint Stroke"
     bl_options = {"UNDO"}
 
-    stroke: CollectionProperty(name="Stroke", description="Points that the brush goes through", type=GPIS_StrokePoint)
-    channel: EnumProperty(name="Channel", description="What is painted", items=CHANNELS, default="DEVIATION")
-    operation: EnumProperty(name="Operation", description="How it is painted", items=OPERATION_ITEMS, default="DEFAULT")
-    radius: FloatProperty(
-        name="Radius", description="Of the brush, in object units", default=0.2, min=1e-6, soft_max=10.0, subtype="DISTANCE"
+    stroke: CollectionProperty(
+        name="Stroke", description="Points that the brush goes through", type=GPIS_StrokePoint, options={"SKIP_SAVE"}
     )
-    strength: FloatProperty(name="Strength", description="Of a dab, at its centre", default=0.5, min=0.0, max=1.0)
+    channel: EnumProperty(
+        name="Channel", description="What is painted", items=CHANNELS, default="DEVIATION", options={"SKIP_SAVE"}
+    )
+    operation: EnumProperty(
+        name="Operation", description="How it is painted", items=OPERATION_ITEMS, default="DEFAULT", options={"SKIP_SAVE"}
+    )
+    radius: FloatProperty(
+        name="Radius",
+        description="Of the brush, in object units",
+        default=0.2,
+        min=1e-6,
+        soft_max=10.0,
+        subtype="DISTANCE",
+        options={"SKIP_SAVE"},
+    )
+    strength: FloatProperty(
+        name="Strength", description="Of a dab, at its centre", default=0.5, min=0.0, max=1.0, options={"SKIP_SAVE"}
+    )
     value: FloatProperty(
         name="Value",
         description="Set: the deviation or length scale in object units. Add: the factor of a dab. Inflate and deflate: the "
         "displacement in radii. 0: the operation's own",
         default=0.0,
         precision=4,
+        options={"SKIP_SAVE"},
     )
     color: FloatVectorProperty(
         name="Color",
@@ -111,6 +127,7 @@ class GPIS_OT_paint_stroke(_OnObject, bpy.types.Operator):
         default=(1.0, 1.0, 1.0),
         min=0.0,
         max=1.0,
+        options={"SKIP_SAVE"},
     )
     ratios: FloatVectorProperty(
         name="Ratios",
@@ -119,9 +136,14 @@ class GPIS_OT_paint_stroke(_OnObject, bpy.types.Operator):
         default=(4.0, 1.0, 1.0),
         min=0.01,
         soft_max=10.0,
+        options={"SKIP_SAVE"},
     )
     falloff: EnumProperty(
-        name="Falloff", description="How the strength falls from centre to rim", items=FALLOFF_ITEMS, default="SMOOTH"
+        name="Falloff",
+        description="How the strength falls from centre to rim",
+        items=FALLOFF_ITEMS,
+        default="SMOOTH",
+        options={"SKIP_SAVE"},
     )
     curve: FloatVectorProperty(
         name="Curve",
@@ -130,9 +152,15 @@ class GPIS_OT_paint_stroke(_OnObject, bpy.types.Operator):
         default=tuple(1 - i / (CURVE_SIZE - 1) for i in range(CURVE_SIZE)),
         min=0.0,
         max=1.0,
+        options={"SKIP_SAVE"},
     )
     symmetry: BoolVectorProperty(
-        name="Symmetry", description="Mirror the stroke in object space", size=3, subtype="XYZ", default=(False, False, False)
+        name="Symmetry",
+        description="Mirror the stroke in object space",
+        size=3,
+        subtype="XYZ",
+        default=(False, False, False),
+        options={"SKIP_SAVE"},
     )
     spacing: FloatProperty(
         name="Spacing",
@@ -141,10 +169,13 @@ class GPIS_OT_paint_stroke(_OnObject, bpy.types.Operator):
         min=0.0,
         soft_max=100.0,
         subtype="PERCENTAGE",
+        options={"SKIP_SAVE"},
     )
-    use_pressure_radius: BoolProperty(name="Radius Pressure", description="The pen's pressure sets the radius", default=False)
+    use_pressure_radius: BoolProperty(
+        name="Radius Pressure", description="The pen's pressure sets the radius", default=False, options={"SKIP_SAVE"}
+    )
     use_pressure_strength: BoolProperty(
-        name="Strength Pressure", description="The pen's pressure sets the strength", default=False
+        name="Strength Pressure", description="The pen's pressure sets the strength", default=False, options={"SKIP_SAVE"}
     )
 
     def paint(self, context, obj):
@@ -206,7 +237,7 @@ class GPIS_OT_paint_stroke(_OnObject, bpy.types.Operator):
 
 
 class _OnChannel(_OnObject):
-    channel: EnumProperty(name="Channel", description="Which", items=_GRID_CHANNELS, default="DEVIATION")
+    channel: EnumProperty(name="Channel", description="Which", items=_GRID_CHANNELS, default="DEVIATION", options={"SKIP_SAVE"})
 
 
 class GPIS_OT_paint_reset(_OnChannel, bpy.types.Operator):

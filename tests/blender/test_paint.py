@@ -187,18 +187,6 @@ print("painted again and rendered", flush=True)
     assert np.isfinite(picture).all() and picture.std() > 0.01
 
 
-def test_a_painted_albedo_is_seen(stage, sphere, tmp_path):
-    """In white light, on a white surface: red is what was painted."""
-    sphere.gpis.sigma = 0.005
-    sphere.data.materials.append(support.diffuse("White", (1, 1, 1)))
-    before = support.picture(stage, tmp_path)
-    paint("ALBEDO", "SET", [(0, -1, 0)], radius=3.0, strength=1.0, color=(1, 0.25, 0), falloff="CONSTANT")
-    after = support.picture(stage, tmp_path)
-    middle = np.s_[14:22, 20:28]
-    np.testing.assert_allclose(before[middle].mean(axis=(0, 1)), (1, 1, 1), rtol=0.02)
-    np.testing.assert_allclose(after[middle].mean(axis=(0, 1)), (1, 0.25, 0), atol=0.03)
-
-
 def test_a_painted_deviation_is_rendered(stage, sphere, tmp_path):
     """Half of the sphere is made fuzzy; the other half stays crisp."""
     sphere.gpis.sigma = 0.01
@@ -268,11 +256,12 @@ def test_a_cancelled_stroke_changes_nothing(sphere, gn, bake):
     painting.add(stroke.Dabs([(1, 0, 0)], [0.3], [1.0], [(0, 0, 0)]))
     painting.cancel()
     assert (sphere.data.filepath, sphere.data.gpis_strokes) == before[:2]
-    assert np.array_equal(bake.fields(sphere).values("mean", [(1, 0, 0)]), gn.VdbField(str(file_of(sphere)), "mean")([(1, 0, 0)]))
+    x = [(1.0, 0.0, 0.0)]
+    np.testing.assert_allclose(bake.fields(sphere).values("mean", x), gn.VdbField(str(file_of(sphere)), "mean")(x), rtol=1e-6)
 
 
 def test_reset_mirror_resample(sphere, gn, bake):
-    base = grids_of(gn, sphere)["mean"]
+    base = bake.fields(sphere).values("mean", arc(3).astype(float))
     paint("MEAN", "INFLATE", arc(3), value=0.3)
     paint("DEVIATION", "SET", arc(3), value=0.2)
     assert bpy.ops.gpis.paint_mirror(channel="DEVIATION", axis="Y", from_positive=bool(arc(3)[0, 1] > 0)) == {"FINISHED"}
@@ -288,7 +277,7 @@ def test_reset_mirror_resample(sphere, gn, bake):
     assert np.ptp(bake.fields(sphere).values("deviation", x)) < 1e-7
     assert bpy.ops.gpis.paint_resample(resolution=RESOLUTION) == {"FINISHED"}
     assert bpy.ops.gpis.paint_reset(channel="MEAN") == {"FINISHED"}
-    np.testing.assert_allclose(grids_of(gn, sphere)["mean"], base, atol=0.02)
+    np.testing.assert_allclose(bake.fields(sphere).values("mean", x), base, atol=0.02)
 
 
 def test_copy_to_selected(sphere, bake):
