@@ -123,7 +123,7 @@ void bind_process(py::module_& m) {
                    throw std::invalid_argument("bounds: min must be below max on every axis.");
              }
              gp->conditions = conditions_argument(conditions);
-             if (gp->conditions) const Posterior checks_conditions(*gp);
+             posterior_of(*gp);  // refuses contradictions
              gp->time = time_argument(time_scale, time);
              if (gp->sigma->range().min < 0)
                throw std::invalid_argument("sigma must not be negative, it goes down to " +

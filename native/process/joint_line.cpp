@@ -20,13 +20,24 @@ JointLine::Plan::Plan(const GaussianProcess& process) : covariance(process) {
 
 void JointLine::begin(const Plan& plan, const LineGeometry& line, double anchor,
                       Counters& counters) {
+  const int block =
+      plan.posterior ? plan.posterior->block(line.origin + line.direction * anchor) : -1;
+  const bool same_base = covariance_ == &plan.covariance && posterior_ == plan.posterior &&
+                         block == block_ && !segments_ && !base_has_segments_;
   covariance_ = &plan.covariance;
   posterior_ = plan.posterior;
   line_ = line;
   anchor_ = anchor;
   at_anchor_ = point(anchor);
-  begin_base(posterior_ ? posterior_->block(at_anchor_.x) : -1, counters);
-  rows_.reset(base_);
+  ++counters.factorisations;
+  if (!same_base) begin_base(block, counters);
+  if (same_base && !rebased_) {
+    rows_.truncate(lasting_rows_);
+    counters.condition_rows += lasting_rows_;
+  } else {
+    rows_.reset(base_);
+  }
+  rebased_ = false;
   lasting_rows_ = rows_.count();
   rows_.law(at_anchor_, anchor_mean_, anchor_law_);
   pull_end_ = anchor;
@@ -46,7 +57,7 @@ void JointLine::begin_base(int block, Counters& counters) {
     for (const auto& segment : segments_->segments)
       for (const SegmentMemory::Row& row : segment)
         base_.add_known(covariance_->at(row.at), row.what, sign_ * row.value, row.noise, counters);
-  ++counters.factorisations;
+  base_has_segments_ = segments_;
 }
 
 void JointLine::reach(double t, Counters& counters) {
@@ -54,6 +65,8 @@ void JointLine::reach(double t, Counters& counters) {
   const int own = rows_.active() - base_.count();
   if (block == block_ && own <= kMostRows) return;
   if (block != block_) begin_base(block, counters);
+  ++counters.factorisations;
+  rebased_ = true;
   rows_.rebase(base_, std::min(own, kKept));
 }
 

@@ -71,6 +71,7 @@ class JointLine {
 
   JointRows base_;  // never forgotten; the line's own rows come after them
   int lasting_rows_ = 0;
+  bool base_has_segments_ = false, rebased_ = false;
   PosteriorPtr posterior_;
   int block_ = -1;
   const SegmentMemory* segments_ = nullptr;

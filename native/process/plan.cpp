@@ -125,7 +125,7 @@ std::shared_ptr<const GaussianProcess> inside_out(const GaussianProcess& process
   else
     out->mean = std::make_shared<ScaledField>(process.mean, -1.0);
   if (process.conditions) {
-    auto conditions = std::make_shared<Conditions>(*process.conditions);
+    auto conditions = std::make_shared<Conditions>(process.conditions->points);
     for (Conditions::Point& p : conditions->points) {
       if (p.value) p.value = -*p.value;
       if (p.gradient) p.gradient = -*p.gradient;

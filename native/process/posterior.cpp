@@ -1,6 +1,7 @@
 #include "process/posterior.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <numeric>
@@ -80,10 +81,10 @@ int Posterior::divide(const Box3& region, std::vector<int> points) {
   Box3 below = region, above = region;
   below.max[axis] = above.min[axis] = at;
   if (!(box.min[axis] < at)) return serve();  // many points in one place
-  // Points far longer than they are apart: all parts would hold them all.
+  // Points closer than the kernel reaches: all parts would hold them all.
   const int rows = rows_of(near(region, 1, kMostRows));
   if (rows < kMostRows &&
-      std::max(rows_of(near(below, 1, kMostRows)), rows_of(near(above, 1, kMostRows))) > 0.7 * rows)
+      std::max(rows_of(near(below, 1, kMostRows)), rows_of(near(above, 1, kMostRows))) > 0.9 * rows)
     return serve();
   Region divided;
   divided.axis = axis;
@@ -209,8 +210,21 @@ double Posterior::truncation(const Box3& region, int block) const {
 }
 
 PosteriorPtr posterior_of(const GaussianProcess& process) {
-  if (!process.conditions || process.conditions->points.empty()) return nullptr;
-  return std::make_shared<const Posterior>(process);
+  if (!process.conditions) return nullptr;
+  const Conditions& conditions = *process.conditions;
+  const std::lock_guard lock(conditions.mutex);
+  for (const Conditions::Solved& s : conditions.solved)
+    if (s.process->mean == process.mean && s.process->sigma == process.sigma &&
+        s.process->kernel == process.kernel && s.process->anisotropy == process.anisotropy)
+      return s.posterior;
+  // A thread that waits for its blocks must not take other work that asks for this lock.
+  PosteriorPtr posterior;
+  tbb::this_task_arena::isolate([&] { posterior = std::make_shared<const Posterior>(process); });
+  // Without a way back to the conditions: they would keep themselves.
+  auto key = std::make_shared<GaussianProcess>(process);
+  key->conditions = nullptr;
+  conditions.solved.push_back({std::move(key), posterior});
+  return posterior;
 }
 
 }  // namespace gpis
