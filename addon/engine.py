@@ -8,6 +8,7 @@ from . import passes, statistics, sync
 from .native import native
 from .session import Limits, Session
 from .sync import camera
+from .viewport import preview
 
 # Seconds between two looks at Esc and the progress: short enough to feel at once, long enough to cost nothing.
 _POLL = 0.1
@@ -22,7 +23,9 @@ class GPISRenderEngine(bpy.types.RenderEngine):
     bl_use_eevee_viewport = True
     bl_use_shading_nodes_custom = False
 
-    # Blender makes instances only to list passes and runs __init__ twice: no state is kept here.
+    # Blender makes instances only to list passes and runs __init__ twice: no state is kept here but that of a viewport,
+    # from its first picture on.
+    _preview = None
 
     def update_render_passes(self, scene, view_layer):
         for entry in passes.enabled(view_layer):
@@ -37,6 +40,15 @@ class GPISRenderEngine(bpy.types.RenderEngine):
         except Exception as error:
             _log.exception("The render failed")
             self.report({"ERROR"}, f"The GPIS engine failed ({type(error).__name__}): {error}")
+
+    def view_update(self, context, depsgraph):
+        if self._preview is None:
+            self._preview = preview.Preview()
+        self._preview.change(depsgraph, context.region_data, preview.size_of(context.region, context.scene))
+
+    def view_draw(self, context, depsgraph):
+        if self._preview is not None:
+            preview.draw(self, context, self._preview)
 
 
 def limits_of(scene):
@@ -143,4 +155,5 @@ def register():
 
 
 def unregister():
+    preview.stop_all()
     bpy.utils.unregister_class(GPISRenderEngine)

@@ -12,7 +12,9 @@ conditions.pin(obj, [location]); conditions.erase(obj, [location], radius)
 import bpy
 from bpy.app.handlers import persistent
 
-from . import bake, operators
+from . import bake, modal, operators, tool
+
+_PARTS = (operators, modal, tool)
 
 
 @persistent
@@ -24,12 +26,14 @@ def register():
     bpy.types.Volume.gpis_strokes = bpy.props.StringProperty(
         name="Strokes", description="What was painted, as data: addon/paint/stroke.py", options={"HIDDEN"}
     )
-    operators.register()
+    for part in _PARTS:
+        part.register()
     bpy.app.handlers.load_post.append(_after_load)
 
 
 def unregister():
     bpy.app.handlers.load_post.remove(_after_load)
-    operators.unregister()
+    for part in reversed(_PARTS):
+        part.unregister()
     bake.forget()
     del bpy.types.Volume.gpis_strokes

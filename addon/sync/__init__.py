@@ -12,11 +12,14 @@ from .state import Sync, SyncError
 __all__ = ["Sync", "SyncError", "describe", "explain"]
 
 
-def describe(depsgraph, width, height):
-    """The description of a frame of `width` × `height` pixels, as a Sync (its `description`, `warnings`)."""
+def describe(depsgraph, width, height, view=None):
+    """The description of a frame of `width` × `height` pixels, as a Sync (its `description`, `warnings`).
+
+    view: the description of another camera than the scene's.
+    """
     sync = Sync(depsgraph)
     sync.description["settings"] = settings.describe(sync)
-    sync.description["camera"] = camera.describe(sync, width, height)
+    sync.description["camera"] = camera.describe(sync, width, height) if view is None else view
     sync.description["world"] = world.describe(sync)
     for instance in depsgraph.object_instances:
         if instance.show_self:
@@ -57,6 +60,6 @@ def _owners(sync):
         yield f"materials['{name}']", f'Material "{name}"', name
     for key, name in sync.mesh_owners.items():
         yield f"meshes['{key}']", f'Object "{name}"', key
-    yield "camera", f'Camera "{sync.scene.camera.name}"', ""
+    yield "camera", f'Camera "{sync.scene.camera.name}"' if sync.scene.camera is not None else "The view", ""
     if sync.scene.world is not None:
         yield "world", f'World "{sync.scene.world.name}"', ""

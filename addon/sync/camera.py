@@ -10,6 +10,9 @@ import numpy as np
 
 from .state import SyncError, array
 
+# Widths of an orthographic view that its camera steps back, to see what is in front of the plane of the view.
+_BEHIND = 100.0
+
 
 def describe(sync, width, height):
     """The part of the frame that the render border keeps is a camera of its own: narrower and shifted."""
@@ -64,6 +67,27 @@ def describe(sync, width, height):
         result["width"] = size[0]
     else:
         result["fov_x"] = 2 * math.atan(size[0] / 2)
+    return result
+
+
+def of_view(region_data):
+    """The camera of a 3D viewport, for a picture that fills its region."""
+    projection = array(region_data.window_matrix)
+    orthographic = not region_data.is_perspective
+    offset = projection[:2, 3] if orthographic else -projection[:2, 2]
+    extent = 2 / np.array([projection[0, 0], projection[1, 1]])
+    result = {
+        "type": "orthographic" if orthographic else "perspective",
+        "matrix": rigid(np.linalg.inv(array(region_data.view_matrix))),
+        "shift": -offset / 2 * extent / max(extent),
+        # An orthographic view begins behind the eye.
+        "clip": (0.0 if orthographic else 1e-3, math.inf),
+    }
+    if orthographic:
+        result["matrix"][:3, 3] += _BEHIND * extent[0] * result["matrix"][:3, 2]
+        result["width"] = extent[0]
+    else:
+        result["fov_x"] = 2 * math.atan(extent[0] / 2)
     return result
 
 

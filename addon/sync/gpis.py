@@ -21,11 +21,7 @@ def add(sync, obj, matrix_world):
     scale = np.linalg.norm(matrix[:3, :3], axis=0)
     if abs(np.linalg.det(matrix[:3, :3])) <= 1e-12 * max(scale.max(), 1e-30) ** 3:
         raise SyncError(f"{owner} is scaled to zero along an axis (scale {_words(scale)}): clear its scale.")
-    try:
-        process = _process(sync, owner, obj)
-    except (ValueError, RuntimeError, OSError) as error:
-        text = str(error)
-        raise SyncError(text if text.startswith(owner) else f"{owner}: {text}") from error
+    process = process_of(sync, obj)
     names = materials.of_object(sync, obj)
     if len(names) > 1:
         sync.warn(f"{owner} has {len(names)} material slots: the first is its micro-BRDF, the others are not used.")
@@ -40,6 +36,23 @@ def add(sync, obj, matrix_world):
             "sampler": obj.gpis.sampler.lower(),
         }
     )
+
+
+def process_of(sync, obj):
+    """The native process of a GPIS object; SyncError with a sentence that names it."""
+    owner = f'GPIS object "{obj.name}"'
+    try:
+        return _process(sync, owner, obj)
+    except (ValueError, RuntimeError, OSError) as error:
+        text = str(error)
+        raise SyncError(text if text.startswith(owner) else f"{owner}: {text}") from error
+
+
+def bounds_of(obj):
+    """The corners of the box outside of which a GPIS object has no surface, in its space."""
+    path = volume.path_of(obj.data)
+    grid = next(grid for grid in volume.grids(path) if grid["name"] == obj.gpis.mean_grid)
+    return grid["min"], grid["max"]
 
 
 def _process(sync, owner, obj):

@@ -45,6 +45,7 @@ class GPIS_PT_object(bpy.types.Panel):
         layout.active = context.object.gpis.enabled
         _draw_fields(layout, context)
         _draw_kernel(layout, context)
+        layout.operator("gpis.realise", icon="MESH_DATA")
 
 
 class GPIS_PT_presets(bpy.types.Panel):

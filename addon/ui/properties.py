@@ -3,10 +3,12 @@
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty
 
+from ..paint.settings import GPIS_PaintProperties
 from .object_properties import GPIS_ConditionPoint, GPIS_ObjectProperties
 
 
 class GPIS_SceneProperties(bpy.types.PropertyGroup):
+    paint: PointerProperty(name="Paint", description="Settings of the paint tool", type=GPIS_PaintProperties)
     use_samples: BoolProperty(name="Limit Samples", description="End the render after this many samples per pixel", default=True)
     samples: IntProperty(name="Samples", description="Samples per pixel", default=128, min=1, soft_max=4096)
     time_limit: FloatProperty(
@@ -31,6 +33,15 @@ class GPIS_SceneProperties(bpy.types.PropertyGroup):
         precision=3,
     )
     seed: IntProperty(name="Seed", description="Another seed gives another noise pattern", default=0, min=0)
+    preview_samples: IntProperty(
+        name="Viewport Samples", description="Samples per pixel of the viewport's picture", default=64, min=1, soft_max=1024
+    )
+    preview_pixel: EnumProperty(
+        name="Pixel Size",
+        description="Pixels of the screen along a side of one of the viewport's picture: larger is faster",
+        items=tuple((str(size), f"{size}x", "", size) for size in (1, 2, 4, 8)),
+        default="4",
+    )
     use_max_bounces: BoolProperty(
         name="Limit Bounces",
         description="End light paths after a number of bounces. Without it no light is lost, paths end by chance",
@@ -84,6 +95,8 @@ class GPIS_ViewLayerProperties(bpy.types.PropertyGroup):
     use_pass_sample_count: BoolProperty(name="Sample Count", description="Samples taken for the pixel", default=False)
 
 
+# Groups inside of others come first.
+_INNER = (GPIS_PaintProperties, GPIS_ConditionPoint)
 _GROUPS = (
     (bpy.types.Scene, GPIS_SceneProperties),
     (bpy.types.ViewLayer, GPIS_ViewLayerProperties),
@@ -92,7 +105,8 @@ _GROUPS = (
 
 
 def register():
-    bpy.utils.register_class(GPIS_ConditionPoint)
+    for group in _INNER:
+        bpy.utils.register_class(group)
     for owner, group in _GROUPS:
         bpy.utils.register_class(group)
         owner.gpis = PointerProperty(type=group)
@@ -106,4 +120,5 @@ def unregister():
     for owner, group in reversed(_GROUPS):
         del owner.gpis
         bpy.utils.unregister_class(group)
-    bpy.utils.unregister_class(GPIS_ConditionPoint)
+    for group in reversed(_INNER):
+        bpy.utils.unregister_class(group)

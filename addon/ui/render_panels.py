@@ -44,6 +44,16 @@ class GPIS_PT_sampling(_RenderPanel, bpy.types.Panel):
             column.prop(scene.render, "threads", text="Number")
 
 
+class GPIS_PT_viewport(_RenderPanel, bpy.types.Panel):
+    bl_label = "Viewport"
+    bl_parent_id = "GPIS_PT_sampling"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def content(self, layout, scene):
+        layout.prop(scene.gpis, "preview_samples", text="Samples")
+        layout.prop(scene.gpis, "preview_pixel")
+
+
 class GPIS_PT_light_paths(_RenderPanel, bpy.types.Panel):
     bl_label = "Light Paths"
     bl_options = {"DEFAULT_CLOSED"}
@@ -122,7 +132,7 @@ def _row(column, name, text):
     split.label(text=text)
 
 
-_CLASSES = (GPIS_PT_sampling, GPIS_PT_light_paths, GPIS_PT_film, GPIS_PT_statistics, GPIS_PT_plan)
+_CLASSES = (GPIS_PT_sampling, GPIS_PT_viewport, GPIS_PT_light_paths, GPIS_PT_film, GPIS_PT_statistics, GPIS_PT_plan)
 
 
 def register():

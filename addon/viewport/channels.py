@@ -1,0 +1,86 @@
+"""What the overlay shows of a channel: colours on the mean surface with a legend, and lines along the long axes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import colour
+
+# Lines along the long axes of the bumps, over the whole surface.
+_LINES = 1500
+
+
+@dataclass
+class Legend:
+    """title, and the texts at the low end, in the middle and at the high end of the colour map."""
+
+    title: str
+    low: str
+    middle: str
+    high: str
+    span: tuple
+
+
+@dataclass
+class View:
+    colours: np.ndarray | None
+    legend: Legend | None
+
+
+def shown(scene, brush, fields, vertices, before=None):
+    """The View of the brush's channel at these points. `before`: a legend whose ends stay, as a stroke goes on."""
+    if brush.channel == "ALBEDO":
+        return View(_display(fields.values("albedo", vertices)), None)
+    if brush.channel in {"DEVIATION", "LENGTH_SCALE"}:
+        deviation = brush.channel == "DEVIATION"
+        values = fields.values(brush.channel.lower(), vertices)
+        low, high = before.span if before else colour.log_range(values, brush.sigma if deviation else brush.length_scale)
+        title = "Deviation σ" if deviation else "Length Scale ℓ"
+        texts = [colour.length(scene, value) for value in (low, np.sqrt(low * high), high)]
+        return View(colour.of(colour.log_parts(values, low, high)), Legend(title, *texts, (low, high)))
+    if brush.channel == "ANISOTROPY":
+        values = ratio(fields.values("anisotropy", vertices))
+        low, high = before.span if before else (1.0, max(2.0, float(values.max()), _longest(brush.ratios)))
+        texts = [f"{value:.3g} : 1" for value in (low, np.sqrt(low * high), high)]
+        legend = Legend("Longest : shortest", *texts, (low, high))
+        return View(colour.of(colour.log_parts(values, low, high)), legend)
+    return View(None, None)
+
+
+def _longest(ratios):
+    return max(ratios) / max(min(ratios), 1e-6)
+
+
+def _display(linear):
+    """Linear colours for a viewport that takes them as they are shown."""
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.maximum(linear, 0) ** (1 / 2.4) - 0.055)
+
+
+def matrices(entries):
+    """(N, 6) of xx,yy,zz,xy,xz,yz -> (N, 3, 3)."""
+    return entries[:, [[0, 3, 4], [3, 1, 5], [4, 5, 2]]]
+
+
+def ratio(entries):
+    """Longest to shortest length scale."""
+    squares = np.linalg.eigvalsh(matrices(entries))
+    return np.sqrt(squares[:, 2] / np.maximum(squares[:, 0], 1e-300))
+
+
+def axes(fields, vertices, normals, surface):
+    """Ends (2 N, 3) of lines along the longest length scale, on a part of the vertices."""
+    chosen = np.random.default_rng(0).permutation(len(vertices))[:_LINES]
+    squares, vectors = np.linalg.eigh(matrices(fields.values("anisotropy", vertices[chosen])))
+    length = float(np.linalg.norm(surface.high - surface.low)) / 60
+    # None where it is as long in every direction: an arbitrary axis would look like a painted one.
+    strength = np.clip(np.sqrt(squares[:, 2] / squares[:, 1]) - 1, 0, 1)[:, None]
+    half = 0.5 * length * strength * vectors[:, :, 2]
+    lifted = vertices[chosen] + 0.1 * length * normals[chosen]
+    ends = np.stack([lifted - half, lifted + half], axis=1)
+    return ends[strength[:, 0] > 0.02].reshape(-1, 3)
+
+
+def moved(fields, surface):
+    """The vertices on the mean surface as it is now: a step of Newton along the gradient as it was."""
+    square = np.sum(surface.gradients**2, axis=1, keepdims=True)
+    return surface.vertices - fields.values("mean", surface.vertices)[:, None] * surface.gradients / np.maximum(square, 1e-12)
