@@ -17,6 +17,7 @@ EXPECTED = [
     if line and not line.startswith("#")
 ]
 _reasons = pytest.StashKey[Counter]()
+_figures = pytest.StashKey[list]()
 
 
 @pytest.fixture
@@ -29,6 +30,12 @@ def seed():
 def full_size():
     """True under `./dev stats`: tests that have a small and a full size take the full one."""
     return bool(os.environ.get("GPIS_TEST_FULL"))
+
+
+@pytest.fixture
+def figure(request):
+    """figure(text): what a test measured, for `./dev stats` to show at its end."""
+    return request.config.stash[_figures].append
 
 
 class SkipAccount:
@@ -63,6 +70,7 @@ def _unexpected(config):
 
 def pytest_configure(config):
     config.stash[_reasons] = Counter()
+    config.stash[_figures] = []
     config.pluginmanager.register(SkipAccount(config))
 
 
@@ -73,6 +81,9 @@ def pytest_sessionfinish(session):
 
 
 def pytest_terminal_summary(terminalreporter, config):
+    if os.environ.get("GPIS_TEST_FULL"):
+        for text in config.stash[_figures]:
+            terminalreporter.write_line(text)
     reasons, unexpected = config.stash[_reasons], _unexpected(config)
     terminalreporter.write_line(f"{sum(reasons.values())} skipped")
     for reason, count in sorted(reasons.items()):

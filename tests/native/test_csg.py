@@ -1,9 +1,12 @@
 """Trees of processes against explicit joint realisations that numpy draws and composes, and their algebra."""
 
+from math import erfc, pi, sqrt
+
 import gpis_native as gn
 import numpy as np
 import pytest
 from statistics_checks import check_proportion, check_same_distribution, check_z
+from tensor_grids import along_x, isotropic
 
 pytestmark = pytest.mark.stats
 BOUNDS = ((0, -3, -3), (4, 3, 3))  # rays run along the x axis from 0 to 4
@@ -27,13 +30,15 @@ def normals(covariance, n, rng):
 class Leaf:
     """A process with a mean that numpy knows, and realisations of it on the x axis."""
 
-    def __init__(self, mean, sigma, kernel, bounds=BOUNDS):
+    def __init__(self, mean, sigma, kernel, bounds=BOUNDS, anisotropy=None):
         self.kernel = gn.SquaredExponential(kernel) if isinstance(kernel, float) else kernel
         self.sigma = sigma
+        # Slopes across the line are independent of the line for one radial correlation (math.md §4).
+        self.radial = anisotropy is None and not isinstance(self.kernel, gn.PlaneWave)
         self.across = sigma * np.sqrt(self.kernel.derivative_variance([0, 1, 0]))
-        self.process = gn.GaussianProcess(mean, sigma, self.kernel, bounds=bounds)
+        self.process = gn.GaussianProcess(mean, sigma, self.kernel, bounds=bounds, anisotropy=anisotropy)
         points = np.column_stack([X, np.zeros((len(X), 2))])
-        self.covariance = self.kernel(points, points)
+        self.covariance = self.process.covariance(points, points) / sigma**2 if sigma > 0 else np.eye(len(X))
         self.mean = self.process.mean(points)
         self.mean_gradient = mean.gradient(points)
 
@@ -56,6 +61,13 @@ WAVE = Leaf(gn.PlaneField([1, 0, 0], [1, 0, 0], 0.1), 0.4, 0.5)
 a, b, c = A.process, B.process, C.process
 MARKOV = Leaf(gn.SphereField([1.6, 0.3, 0], 0.8), 0.2, gn.Matern(1.5, 0.5))
 SPECTRAL = Leaf(gn.SphereField([1.9, 0, 0], 0.6), 0.2, gn.RationalQuadratic(1.0, 0.4))
+VARYING = Leaf(
+    gn.SphereField([1.8, 0.2, 0], 0.9),
+    0.25,
+    gn.SquaredExponential(1),
+    anisotropy=along_x(lambda x: isotropic(0.3 * np.exp(x / 6)), 6),
+)
+RIPPLE = Leaf(gn.PlaneField([1.5, 0, 0], [1, 0, 0], 0.2), 0.4, gn.PlaneWave([5.0, 2.0, 1.0]))
 BOX = Leaf(gn.BoxField([1.7, 0, 0], [1.2, 2, 2]), 0.0, 1.0)
 
 TREES = {
@@ -68,6 +80,12 @@ TREES = {
     "cut by a certain box": (gn.intersection(BOX.process, b), [BOX, B], False),
     "waves": (gn.intersection(gn.union(a, WAVE.process), gn.complement(c)), [A, WAVE, C], False),
     "Markov less spectral": (gn.difference(MARKOV.process, SPECTRAL.process), [MARKOV, SPECTRAL], False),
+    "deep, one process twice": (
+        gn.union(gn.difference(a, gn.intersection(b, c)), gn.intersection(WAVE.process, gn.complement(a))),
+        [A, B, C, WAVE, A],
+        False,
+    ),
+    "varying lengths less a plane wave": (gn.difference(VARYING.process, RIPPLE.process), [VARYING, RIPPLE], False),
     "shared union": (gn.union(*[s.process for s in SAME], shared_noise=True), SAME, True),
     "shared difference": (gn.difference(*[s.process for s in SAME], shared_noise=True), SAME, True),
     "shared inside": (
@@ -110,7 +128,7 @@ def first_crossings(tree, leaves, g, rng):
         values = f[mine][:, :, k]
         r = np.arange(len(mine))
         slope = (values[r, j] - values[r, j - 1]) / step
-        # Slopes across the line are independent of the line (math.md §4); F falls along the ray.
+        # F falls along the ray.
         across = leaf.across * rng.normal(size=(len(mine), 2))
         full = np.column_stack([slope, leaf.mean_gradient[j, 1:] + across])
         gradient[mine] = full * -np.sign(slope)[:, None]
@@ -133,7 +151,7 @@ def test_first_hits_of_explicit_realisations(name, n, seed):
             continue
         check_same_distribution(hits["t"][hits["part"] == k], t[part == k], f"{name}: t of part {k}")
         if leaves[k].sigma > 0:
-            for axis in range(3):
+            for axis in range(3 if leaves[k].radial else 1):
                 pair = hits["gradient"][hits["part"] == k, axis], gradient[part == k, axis]
                 check_same_distribution(*pair, f"{name}: gradient {axis} of part {k}")
     hit = np.isfinite(hits["t"])
@@ -243,6 +261,27 @@ def test_union_of_independent_constants(n, seed):
     check_proportion(inside.sum(), m, 1 - 0.5**3)
 
 
+@pytest.mark.parametrize("shared", [False, True])
+def test_marginals_of_the_composition(shared, n, seed):
+    """Oracle 18, Clark 1961: mean and second moment of the greater and the lesser of two Gaussians, correlated where noise
+    is shared."""
+    mu, sigma, m = np.array([0.3, -0.2]), np.array([0.5, 0.8]), 10 * n
+    leaves = [gn.GaussianProcess(u, s, gn.SquaredExponential(1)) for u, s in zip(mu, sigma, strict=True)]
+    f = np.column_stack([leaf.sample(np.zeros((1, 3)), m, seed + (0 if shared else k)) for k, leaf in enumerate(leaves)])
+    nu = np.sqrt(np.sum(sigma**2) - 2 * shared * sigma[0] * sigma[1])
+    alpha = (mu[0] - mu[1]) / nu
+    low, high = 0.5 * erfc(-alpha / sqrt(2)), 0.5 * erfc(alpha / sqrt(2))
+    phi = np.exp(-(alpha**2) / 2) / sqrt(2 * pi)
+    mean = mu[0] * low + mu[1] * high + nu * phi
+    second = (mu[0] ** 2 + sigma[0] ** 2) * low + (mu[1] ** 2 + sigma[1] ** 2) * high + (mu[0] + mu[1]) * nu * phi
+    greater = gn.intersection(*leaves, shared_noise=shared).compose(f)
+    lesser = gn.union(*leaves, shared_noise=shared).compose(f)
+    check_z(greater.mean(), mean, greater.std() / sqrt(m))
+    check_z((greater**2).mean(), second, (greater**2).std() / sqrt(m))
+    check_z(lesser.mean(), mu.sum() - mean, lesser.std() / sqrt(m))
+    check_z((lesser**2).mean(), np.sum(mu**2 + sigma**2) - second, (lesser**2).std() / sqrt(m))
+
+
 def same(x, y):
     for key in ("t", "part", "gradient"):
         np.testing.assert_array_equal(x[key], y[key])
@@ -298,6 +337,63 @@ def test_what_decides_nothing_is_not_drawn(seed):
     hole = gn.GaussianProcess(gn.SphereField([2, 0, 0], 2.5), 0.0, gn.SquaredExponential(1))
     gone = gn.first_hits(gn.difference(a, hole), origins, directions, 4, seed=seed)["counters"]
     assert gone["line_skipped"] == m and gone["line_normals"] == 0
+
+
+GLOBAL = ["nested", "complements", "Markov less spectral", "shared inside"]
+
+
+@pytest.mark.parametrize("name", GLOBAL)
+def test_global_is_one_realisation_of_every_leaf(name, full_size, seed):
+    """Memory global: hits, and those of the rays reflected there, are roots of the composition of gp.realisation_at of the
+    leaves under the seeds in the state, with F > 0 in between; the leaf that is hit gives the gradient."""
+    tree, leaves, shared = TREES[name]
+    groups = shared or range(len(leaves))
+    n, rng = 300 if full_size else 30, np.random.default_rng(seed)
+    origins, directions = rays(n)
+    origins[:, 1:] += rng.uniform(-0.3, 0.3, (n, 2))
+    hits = gn.first_hits(tree, origins, directions, 4, memory="global", seed=seed)
+    compared = 0
+    for bounce in range(2):
+        rows = np.flatnonzero(np.isfinite(hits["t"]))
+        realisation = hits["state"]["realisation"]
+        for i in rows:
+            # A path that entered a leaf inside has moved it: not the realisation of the seed alone.
+            if np.isfinite(realisation["shift"][i]).any():
+                continue
+            part, t = hits["part"][i], np.append(np.linspace(0.02, 0.98, 25), 1) * hits["t"][i]
+            points = origins[i] + t[:, None] * directions[i]
+            seeds = [int(realisation["seed"][i, list(groups).index(k)]) for k in groups]
+            at = [leaf.process.realisation_at(points, s) for leaf, s in zip(leaves, seeds, strict=True)]
+            f = tree.compose(np.stack([x["value"][0] for x in at], axis=-1))
+            assert abs(f[-1]) < 1e-6 and f[:-1].min() > -1e-3
+            np.testing.assert_allclose(np.abs(hits["gradient"][i]), np.abs(at[part]["gradient"][0, -1]), atol=1e-4)
+            assert hits["gradient"][i] @ directions[i] <= 0
+            compared += 1
+        state = {k: hits["state"][k][rows] for k in ("value", "gradient")}
+        state["realisation"] = {k: v[rows] for k, v in realisation.items()}
+        origins, gradient, d = hits["position"][rows], hits["gradient"][rows], directions[rows]
+        normal = gradient / np.linalg.norm(gradient, axis=1, keepdims=True)
+        directions = d - 2 * np.sum(d * normal, axis=1, keepdims=True) * normal
+        if bounce == 0:
+            hits = gn.first_hits(tree, origins, directions, 4, memory="global", start=state, seed=seed + 1)
+            np.testing.assert_array_equal(hits["state"]["realisation"]["seed"], state["realisation"]["seed"])
+    assert compared > 0.4 * n
+
+
+@pytest.mark.parametrize("name", GLOBAL)
+def test_first_hits_of_global_are_those_of_lines(name, n, seed):
+    """A fresh path sees a fresh realisation: the law of the first hit is that of the samplers of lines."""
+    tree, leaves, _ = TREES[name]
+    m = n // 10
+    hits = gn.first_hits(tree, *rays(m), 4, memory="global", seed=seed)
+    lines = gn.first_hits(tree, *rays(n), 4, seed=seed + 1)
+    check_same_distribution(hits["t"], lines["t"], f"{name}: t")
+    for k in range(len(leaves)):
+        p = np.mean(lines["part"] == k)
+        check_proportion(np.sum(hits["part"] == k), m, p, np.sqrt(p * (1 - p) / n), f"{name}: part {k}")
+    for axis in range(3):
+        pair = [h["gradient"][np.isfinite(h["t"]), axis] for h in (hits, lines)]
+        check_same_distribution(*pair, f"{name}: gradient {axis}")
 
 
 def test_two_spheres_of_the_paper(n, seed):

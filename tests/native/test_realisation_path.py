@@ -82,10 +82,22 @@ def select(hits, rows):
     return {"t": hits["t"][rows], "position": hits["position"][rows], "state": state}
 
 
-@pytest.mark.parametrize("kernel", [gn.SquaredExponential(0.3), gn.Matern(1.5, 0.4)])
+GLOBAL = [
+    gn.SquaredExponential([0.6, 0.15, 0.3], rotation=[0.9, 0.3, -0.2, 0.1]),
+    gn.Matern(1.5, 0.4),
+    gn.Wong(0.4),
+    gn.RationalQuadratic(0.7, 0.3),
+    gn.LocallyPeriodic(0.6, 0.9, [0, 0.6, 0.8], 1.2),
+    gn.PlaneWave([3.0, -4.0, 8.0]),
+    0.6 * gn.SquaredExponential(0.4) + 0.4 * gn.Matern(2.5, 0.3),
+    gn.RationalQuadratic(1, 0.4) * gn.PlaneWave([2.0, 1.0, -2.0]),
+]
+
+
+@pytest.mark.parametrize("kernel", GLOBAL, ids=repr)
 def test_global_is_one_realisation(kernel, full_size, seed):
     """Hits of a path and their gradients are those of gp.realisation_at under the seed in the state; f > 0 between."""
-    n = 1000 if full_size else 100
+    n = 1000 if full_size else 50
     gp = gn.GaussianProcess(-1 * gn.SphereField([0, 0, 0], 1), 0.3, kernel, bounds=SPHERE_BOX)
     rng = np.random.default_rng(seed)
     directions = rng.normal(size=(n, 3))

@@ -83,44 +83,6 @@ def test_implied_correlation(name, start, n, seed):
     check_z(np.maximum(difference, 0), 0, error, "covariance")
 
 
-@pytest.mark.parametrize(
-    ("start", "memory", "survival"),
-    [
-        ("outside", "renewal+", [0.84229, 0.69407, 0.45573, 0.12893, 0.03639]),
-        ("surface", "renewal", [0.96922, 0.88063, 0.61086, 0.17080, 0.04818]),
-        ("slope 1", "renewal+", [0.99669, 0.88074, 0.58803, 0.16682, 0.04701]),
-    ],
-)
-def test_survival_of_the_squared_exponential(start, memory, survival, n, seed):
-    """Oracle 6: brute force over 1.4 million paths, standard error 4e-4."""
-    gp = gn.GaussianProcess(0, 1, gn.SquaredExponential(1), bounds=((-1, -1, -1), (12, 1, 1)))
-    state = None
-    if start != "outside":
-        state = {"value": np.zeros(n), "gradient": np.tile([1.0, 0.3, -0.2], (n, 1))}
-    along = np.zeros((n, 3)), np.tile([1.0, 0, 0], (n, 1))
-    hits = gn.first_hits(gp, *along, 9, memory=memory, start=state, sampler="spectral", seed=seed)
-    check_proportion([np.sum(hits["t"] > t) for t in [0.5, 1, 2, 5, 8]], n, survival, 4e-4, start)
-
-
-def test_plane_wave(n, seed):
-    """Oracle 15: T = 1 - wt/π from outside, excursions of π/w exactly, whatever the memory."""
-    gp = gn.GaussianProcess(0, 1, WAVE, bounds=((-40, -40, -40), (40, 40, 40)))
-    w = abs(np.array([2.0, 0.5, 1.0]) @ DIRECTION)
-    hits = gn.first_hits(gp, *rays(n), 30, seed=seed)
-    t = np.array([0.1, 0.25, 0.5, 0.75, 0.9]) * math.pi / w
-    check_proportion([np.sum(hits["t"] > x) for x in t], n, 1 - w * t / math.pi, 0.0, "from outside")
-    assert hits["t"].max() <= math.pi / w * (1 + 1e-12)
-    wave_vector = np.array([2.0, 0.5, 1.0])
-    state = {"value": np.zeros(50), "gradient": np.tile(np.sign(wave_vector @ DIRECTION) * wave_vector, (50, 1))}
-    for memory in ["renewal", "renewal+"]:
-        again = gn.first_hits(gp, *rays(50), 30, start=state, memory=memory, seed=seed)
-        np.testing.assert_allclose(again["t"], math.pi / w, rtol=1e-9)
-    # Across the wave g is constant: no ray ever hits.
-    across = np.cross(wave_vector, DIRECTION) / np.linalg.norm(np.cross(wave_vector, DIRECTION))
-    none = gn.first_hits(gp, rays(50)[0], np.tile(across, (50, 1)), 30, seed=seed)
-    assert np.isinf(none["t"]).all()
-
-
 @parametrize
 @pytest.mark.parametrize("level", [0.0, 1.0])
 def test_rate_and_gradients_of_crossings(name, level, n, seed):

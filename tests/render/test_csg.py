@@ -70,6 +70,20 @@ def test_furnace(name, material, memory, seed):
 
 
 @pytest.mark.stats
+@pytest.mark.parametrize("material", ["white", "mirror"])
+@pytest.mark.parametrize("name", ["nested", "shared"])
+def test_furnace_of_global(name, material, seed):
+    """One realisation of every operand for the whole path: nothing is lost either, whatever the threads."""
+    scene = gn.Scene(seen(TREES[name], [material], memory="global"))
+    results = [gn.render(scene, 8, 8, samples=16, seed=seed, threads=t) for t in (1, 2)]
+    for result in results:
+        assert np.allclose(result.passes["combined"], 1, atol=1e-6)
+        assert all(result.stats[k] == 0 for k in ("path_length_limit", "line_step_limit", "nan_samples", "states_inside"))
+        assert result.stats["path_vertices"] > 8 * 8 * 16 / 8
+    assert np.array_equal(results[0].passes["depth"], results[1].passes["depth"])
+
+
+@pytest.mark.stats
 @pytest.mark.parametrize("memory", MEMORIES)
 @pytest.mark.parametrize("material", ["white", "mirror"])
 def test_furnace_with_light_sampling(material, memory, seed):

@@ -207,6 +207,24 @@ def test_false_cancels(noisy):
     assert np.isfinite(result.passes["combined"]).all()
 
 
+def test_a_line_that_takes_long_ends_with_the_render():
+    """A length scale of a millionth of the bounds: a ray that notices nothing marches to the bound on its steps."""
+    eye = np.eye(4)
+    eye[2, 3] = 4
+    process = gn.GaussianProcess(1.0, 0.1, gn.LocallyPeriodic(1e-6, 1e-6, [0, 0, 1], 0.1), bounds=([-1, -1, -1], [1, 1, 1]))
+    scene = {
+        "version": 1,
+        "settings": {"missed_root": 1e-300},
+        "camera": {"type": "orthographic", "matrix": eye, "width": 1},
+        "world": {"color": (1, 1, 1)},
+        "materials": {"grey": {"type": "lambert", "color": (0.5, 0.5, 0.5)}},
+        "objects": [{"name": "Dust", "type": "gpis", "process": process, "materials": ["grey"]}],
+    }
+    result = gn.render(gn.Scene(scene), 4, 4, samples=16, threads=1, progress=lambda fraction, stats: False)
+    assert result.stats["cancelled"] is True
+    assert result.stats["line_evaluations"] > 0 and result.stats["line_step_limit"] == 0
+
+
 def test_an_exception_in_progress_ends_the_render(noisy):
     class Stop(Exception):
         pass

@@ -1,0 +1,38 @@
+"""Kernels of one length scale, the samplers that serve them, and how many rays each is worth in a test."""
+
+import gpis_native as gn
+
+KERNELS = {
+    "squared exponential": gn.SquaredExponential(1),
+    "matern 3/2": gn.Matern(1.5, 1),
+    "matern 5/2": gn.Matern(2.5, 1),
+    "wong": gn.Wong(1),
+    "rational quadratic": gn.RationalQuadratic(0.7, 1),
+    "locally periodic": gn.LocallyPeriodic(1.5, 2.5, [0.6, 0.8, 0], 1.2),
+    "plane wave": gn.PlaneWave([1.0, 0.5, 0.3]),
+    "sum with a rough term": 0.6 * gn.SquaredExponential(1) + 0.4 * gn.Matern(1.5, 1),
+}
+SMOOTH = ["spectral", "nystrom", "dense", "realisation"]
+ROUGH = ["markov", "dense", "realisation"]
+SAMPLERS = {
+    "squared exponential": ["convolution", *SMOOTH],
+    "matern 3/2": ROUGH,
+    "matern 5/2": ROUGH,
+    "wong": ROUGH,
+    "rational quadratic": SMOOTH,
+    "locally periodic": SMOOTH,
+    "plane wave": SMOOTH,
+    "sum with a rough term": ["dense", "realisation"],
+}
+SERVED = [(kernel, sampler) for kernel, samplers in SAMPLERS.items() for sampler in samplers]
+# `dense` of these draws every line from its own covariance.
+JOINT = ["locally periodic", "plane wave", "sum with a rough term"]
+
+
+def factorises(kernel, sampler):
+    return sampler == "nystrom" or (sampler == "dense" and kernel in JOINT)
+
+
+def worth(kernel, sampler, n):
+    """n rays of the fast samplers, fewer of the slow ones."""
+    return n // 100 if sampler == "realisation" else n // 30 if factorises(kernel, sampler) else n

@@ -1,0 +1,117 @@
+"""What has an exact answer, over every sampler that serves a kernel (design oracles, numbered as there), and what each sampler
+does not do (counters). The survivals of oracles 5 and 6 and the gradients of 9 are in test_process.py, test_markov.py and
+test_realisation_path.py."""
+
+from math import erfc, pi, sqrt
+
+import gpis_native as gn
+import numpy as np
+import pytest
+from line_samplers import KERNELS, SERVED, factorises, worth
+from statistics_checks import check_proportion, check_z
+
+pytestmark = pytest.mark.stats
+every = pytest.mark.parametrize(("kernel", "sampler"), SERVED)
+X = np.array([1.0, 0, 0])
+
+
+@pytest.fixture
+def n(full_size):
+    return 400_000 if full_size else 20_000
+
+
+def along_x(n):
+    return np.zeros((n, 3)), np.tile(X, (n, 1))
+
+
+def line(length):
+    return ((-1, -1, -1), (length, 1, 1))
+
+
+@every
+def test_crossings_that_a_fixed_grid_sees(kernel, sampler, n, seed):
+    """Oracle 3: of two values h apart one is above and one below its mean with probability arccos ρ(h)/π. A mean of 5
+    deviations keeps the paths outside; the tolerance makes the sampler draw there."""
+    k, h, n = KERNELS[kernel], 0.3, worth(kernel, sampler, n)
+    gp = gn.GaussianProcess(5.0, 1, k, bounds=line(8))
+    t = 0.1 + h * np.arange(20)
+    g = gn.line_values(gp, *along_x(n), t, tolerance=1e-6, sampler=sampler, seed=seed) - 5
+    g = g[np.isfinite(g).all(axis=1)]
+    assert len(g) > 0.99 * n
+    for step in (1, 4):
+        seen = (np.sign(g[:, step:]) != np.sign(g[:, :-step])).mean(axis=1)  # of a path; paths are independent
+        expected = np.arccos(k([[step * h, 0, 0]], [[0, 0, 0]])[0, 0] / k.variance) / pi
+        check_z(seen.mean(), expected, seen.std() / sqrt(len(g)), f"lag {step}")
+
+
+@pytest.mark.parametrize(("kernel", "sampler"), [p for p in SERVED if p[0] not in ("rational quadratic", "plane wave")])
+def test_mean_excursion(kernel, sampler, n, seed):
+    """Oracle 4: π/√λ₂ above zero, from a start on the surface with the flux-weighted slope (Renewal)."""
+    n = worth(kernel, sampler, n)
+    gp = gn.GaussianProcess(0.0, 1, KERNELS[kernel], bounds=line(30))
+    state = {"value": np.zeros(n), "gradient": np.tile(X, (n, 1))}
+    t = gn.first_hits(gp, *along_x(n), 29, memory="renewal", start=state, sampler=sampler, seed=seed)["t"]
+    assert np.isfinite(t).mean() > 0.998
+    t = np.minimum(t, 29)
+    # Longer ones than the line are rare, and not much longer.
+    beyond = 5 * np.mean(t == 29)
+    assert abs(t.mean() - pi / sqrt(KERNELS[kernel].derivative_variance(X))) < 5.33 * t.std() / sqrt(n) + beyond
+
+
+@every
+def test_occupancy(kernel, sampler, n, seed):
+    """Oracle 1, and what a fresh ray is: f > 0 by Φ(μ/σ) alone, so that its value at the start is a normal truncated at 0."""
+    n, mu = worth(kernel, sampler, n), 0.4
+    gp = gn.GaussianProcess(mu, 1, KERNELS[kernel], bounds=line(8))
+    f = gn.line_values(gp, *along_x(n), [1e-9], sampler=sampler, seed=seed)[:, 0]
+    assert np.isfinite(f).mean() > 0.999
+    for level in (0.3, 1.0, 2.0):
+        above = erfc((level - mu) / sqrt(2)) / erfc(-mu / sqrt(2))
+        check_proportion(np.sum(f > level), n, above, what=f"above {level}")
+    assert np.nanmin(f) > 0
+
+
+@pytest.mark.parametrize("sampler", ["spectral", "nystrom", "dense", "realisation"])
+def test_plane_wave(sampler, n, seed):
+    """Oracle 15: T = 1 - wt/π from outside, excursions of π/w exactly."""
+    n, wave = worth("plane wave", sampler, n), np.array([2.0, 0.5, 1.0])
+    gp = gn.GaussianProcess(0, 1, gn.PlaneWave(wave), bounds=((-9, -9, -9), (9, 9, 9)))
+    direction = np.array([0.48, -0.64, 0.6])
+    w = abs(wave @ direction)
+
+    def hits(n, direction=direction, **start):
+        return gn.first_hits(gp, np.zeros((n, 3)), np.tile(direction, (n, 1)), 7, sampler=sampler, seed=seed, **start)["t"]
+
+    t, fractions = hits(n), np.array([0.1, 0.25, 0.5, 0.75, 0.9])
+    check_proportion([np.sum(t > x * pi / w) for x in fractions], n, 1 - fractions, what="from outside")
+    # Dense rows carry noise of 1e-3 deviations.
+    off = 1e-2 if sampler == "dense" else 1e-4
+    assert t.max() <= pi / w * (1 + off)
+    for memory in ("renewal", "renewal+"):
+        state = {"value": np.zeros(50), "gradient": np.tile(np.sign(wave @ direction) * wave, (50, 1))}
+        np.testing.assert_allclose(hits(50, start=state, memory=memory), pi / w, rtol=off)
+    # Across the wave g is constant: no ray ever hits.
+    across = np.cross(wave, direction)
+    assert np.isinf(hits(50, across / np.linalg.norm(across))).all()
+
+
+@every
+def test_far_rays_draw_nothing_and_stationary_kernels_factorise_nothing(kernel, sampler, seed):
+    """Issue "the process, exact", must show 5. Rays 20 deviations away from a sphere inside the bounds, and at it: the same
+    counters."""
+    k, sigma, n = KERNELS[kernel], 0.05, 40
+    gp = gn.GaussianProcess(gn.SphereField([0, 0, 0], 1), sigma, k, bounds=((-2.5,) * 3, (2.5,) * 3))
+    origins, directions = np.tile([0.0, 0, 2.4], (n, 1)), np.tile([0.0, 0, -1], (n, 1))
+
+    def counters(x):
+        return gn.first_hits(gp, origins + [x, 0, 0], directions, 10, sampler=sampler, seed=seed)["counters"]
+
+    drawn = ("line_normals", "truncated_normals", "line_evaluations", "mean_lookups", "factorisations")
+    far = counters(1 + 20 * sigma)
+    assert far["line_skipped"] == n and far["line_segments"] == 0
+    assert all(far[name] == 0 for name in drawn)
+    counters(0.0)  # tables that all rays share are made by the first of them
+    near = counters(0.0)
+    assert near["line_skipped"] == 0 and near["line_segments"] == n
+    assert near["line_normals"] >= 2 * n and near["line_evaluations"] > n and near["mean_lookups"] > n
+    assert near["factorisations"] == (n if factorises(kernel, sampler) else 0)
