@@ -15,6 +15,9 @@
 namespace gpis {
 namespace {
 
+// A march ends a line after some million steps (process/march.h) and counts it.
+constexpr double kTooManySteps = 1e6;
+
 // The same f with a kernel of unit variance: the weight of a kernel multiplies σ² (definitions E9).
 std::shared_ptr<const GaussianProcess> normalised(std::shared_ptr<const GaussianProcess> process) {
   const double variance = process->kernel->variance();
@@ -180,6 +183,15 @@ PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Memory mem
   // A certain surface (σ = 0) still needs a last step across it: stop a little before the root.
   const double scale = std::min(shortest, std::isfinite(diagonal) ? diagonal : 1.0);
   plan.skip_threshold = std::max(plan.skip_deviations * sigma.max, 1e-4 * scale);
+  // A ray meets the surface about a deviation behind the place where it may first be, unless it
+  // starts behind that.
+  const double slope = process->mean->lipschitz();
+  const double approach =
+      slope * diagonal > plan.skip_threshold ? 4 * sigma.min / (slope * shortest) : 0;
+  if (approach > kTooManySteps)
+    refuse("The length scale ", shortest, " is so small against the standard deviation ", sigma.min,
+           " that a ray takes ", approach, " steps to the surface, and the most is ", kTooManySteps,
+           ". Take a longer length_scale or a smaller sigma.");
   plan.smooth_scale = std::min(process->mean->smooth_scale(), process->sigma->smooth_scale());
   plan.mean_lipschitz = process->mean->lipschitz();
   plan.sigma_lipschitz = process->sigma->lipschitz();

@@ -354,3 +354,16 @@ def test_roots_are_not_missed(memory, full_size, seed):
     inside = np.nanmin(np.column_stack([values, np.ones(n)]), axis=1) < 0
     assert np.isfinite(hits["t"]).mean() > 0.2
     assert np.mean(inside) < 1e-3, f"{inside.sum()} of {n} rays passed through"
+
+
+def test_a_length_scale_that_no_ray_gets_through_gets_a_sentence():
+    """Every ray would be ended on its way to the surface, after a million steps."""
+    sphere = gn.SphereField((0, 0, 0), 1)
+    with pytest.raises(ValueError, match="The length scale 1e-30 is so small against the standard deviation 0.04"):
+        gn.first_hits(gn.GaussianProcess(sphere, 0.04, gn.SquaredExponential(1e-30)), [(0, 0, 3)], [(0, 0, -1)], 10.0)
+    # A thin skin of tiny bumps is another matter, and so is a medium: no way to its surfaces.
+    skin = gn.GaussianProcess(sphere, 1e-7, gn.SquaredExponential(1e-6))
+    medium = gn.GaussianProcess(gn.ConstantField(0.1), 1.0, gn.SquaredExponential(1e-9))
+    for process in (skin, medium):
+        hits = gn.first_hits(process, [(0, 0, 3)] * 20, [(0, 0, -1)] * 20, 10.0)
+        assert np.isfinite(hits["t"]).all() and hits["counters"]["line_step_limit"] == 0
