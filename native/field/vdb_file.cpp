@@ -95,6 +95,11 @@ std::vector<VdbGridInfo> vdb_grids(const std::string& path) {
 }
 
 void write_vdb(const std::string& path, const VdbArrays& arrays) {
+  const Vec3& h = arrays.voxel_size;
+  if (!(h.x * h.y * h.z >= 3e-15))  // OpenVDB's tolerance
+    refuse("The voxels of \"", path, "\" would be ", h.x, " x ", h.y, " x ", h.z,
+           " large; OpenVDB takes none below 1.5e-05. Make the object larger, and scale it down "
+           "where it is placed.");
   const auto folder = std::filesystem::path(path).parent_path();
   if (!folder.empty() && !std::filesystem::is_directory(folder))
     throw FileNotFound("There is no folder \"" + folder.string() + "\" to write \"" + path +

@@ -140,3 +140,11 @@ def test_unusable_meshes_get_a_sentence(tmp_path):
             gn.bake_mesh_distance(v, t, path, **options)
         assert text in str(error.value)
     assert not path.exists()
+
+
+def test_a_mesh_too_small_for_openvdb_gets_a_sentence(tmp_path):
+    vertices, triangles = box_mesh((0, 0, 0), (1e-6, 1e-6, 1e-6))
+    with pytest.raises(ValueError, match="OpenVDB takes none below 1.5e-05. Make the object larger"):
+        gn.bake_mesh_distance(vertices, triangles, tmp_path / "tiny.vdb", resolution=16, margin=1e-7)
+    gn.bake_mesh_distance(vertices * 1e3, triangles, tmp_path / "small.vdb", resolution=16, margin=1e-4)
+    assert gn.VdbField(tmp_path / "small.vdb", "mean")([(5e-4, 5e-4, 5e-4)]) < 0
