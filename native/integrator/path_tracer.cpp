@@ -18,6 +18,11 @@ constexpr int kRouletteStart = 3;
 constexpr int kGradientDecision = 0, kDirectionDecision = 1, kLightDecision = 2;
 constexpr int kVertexDecisions = kLightDecision + LightSet::kMostGroups;
 
+// Where rays may start: Embree would end the program on others. A near plane may lie outside, and a
+// medium without bounds goes on there, unseen.
+constexpr double kReach = 2 * kFarthest;
+constexpr Box3 kWithinReach{{-kReach, -kReach, -kReach}, {kReach, kReach, kReach}};
+
 // What a path knows of each stochastic surface at the point it leaves; nothing: a fresh start
 // outside of it.
 using PathMemory = std::vector<std::optional<State>>;
@@ -189,8 +194,11 @@ TreeHit PathTracer::Impl::first_hit(const Scene::Impl::Body& body, Line* body_li
 // first hits wins (union of independent processes, definitions B5).
 bool PathTracer::Impl::closest(const Ray& ray, double t_max, Vertex& v) {
   MeshHit mesh;
-  double nearest = t_max;
-  const bool hit_mesh = scene.triangles && scene.triangles->intersect(ray, t_max, mesh, *counters);
+  const auto [start, end] = clip(kWithinReach, ray.origin, ray.direction, 0, t_max);
+  if (start > 0 || end < 0) return false;
+  double nearest = end;
+  const bool hit_mesh =
+      scene.triangles && scene.triangles->intersect(ray, nearest, mesh, *counters);
   if (hit_mesh) nearest = mesh.t;
   for (const auto& body : scene.bodies) {
     const auto [enter, leave] = clip(body.surface.bounds(), ray.origin, ray.direction, 0, nearest);
@@ -199,7 +207,7 @@ bool PathTracer::Impl::closest(const Ray& ray, double t_max, Vertex& v) {
     if (!meets) continue;
     const TreeHit hit =
         first_hit(body, &lines[body.first], ray, nearest, memory, realisations, *rng);
-    if (hit.t >= nearest) continue;
+    if (!(hit.t < nearest)) continue;
     nearest = hit.t;
     v.surface = static_cast<int>(body.first) + hit.leaf;
   }

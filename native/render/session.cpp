@@ -8,6 +8,9 @@
 #include <exception>
 #include <memory>
 #include <mutex>
+#include <new>
+#include <stdexcept>
+#include <string>
 #include <thread>
 #include <tuple>
 
@@ -43,9 +46,8 @@ class Session {
         clamp_(scene.description().settings.clamp),
         tiles_x_((options.width + kTileSize - 1) / kTileSize),
         tiles_((options.height + kTileSize - 1) / kTileSize * tiles_x_),
-        tile_locks_(tiles_) {
-    result_.film = Film(options.width, options.height);
-  }
+        result_(empty_result(options.width, options.height)),
+        tile_locks_(tiles_) {}
 
   RenderResult run(const ProgressCallback& progress) {
     try {
@@ -67,6 +69,21 @@ class Session {
     Counters counters;
     std::optional<BadSample> bad_sample;
   };
+
+  static RenderResult empty_result(int width, int height) {
+    try {
+      RenderResult result;
+      result.film = Film(width, height);
+      return result;
+    } catch (const std::bad_alloc&) {
+      const double bytes = sizeof(PixelSums) * static_cast<double>(width) * height;
+      throw std::runtime_error("A picture of " + std::to_string(width) + " x " +
+                               std::to_string(height) + " pixels takes " +
+                               std::to_string(static_cast<std::int64_t>(bytes / 1e9) + 1) +
+                               " GB of memory, which is not to be had. Render a smaller one, or in "
+                               "parts (a border).");
+    }
+  }
 
   double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
 

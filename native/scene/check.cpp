@@ -6,6 +6,9 @@
 namespace gpis {
 namespace {
 
+// Areas and solid angles of lights below this (squared) or above its inverse are no numbers.
+constexpr double kSmallestLight = 1e-30;
+
 template <class... Parts>
 [[noreturn]] void fail(const Parts&... parts) {
   std::ostringstream sentence;
@@ -37,13 +40,35 @@ void check_color(const Color& c, double high, const std::string& path) {
           high < kInfinity ? " and at most 1 (a surface reflects no more than it receives)." : ".");
 }
 
+// Of a length that may also be left out (0).
+void check_size(double value, const std::string& path) {
+  if (value != 0) check_between(value, kSmallestLight, 1 / kSmallestLight, path);
+}
+
+double largest(const Vec3& v) {
+  return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+}
+
+// Greatest sum of a row's absolute entries.
+double greatest_row(const Mat3& m) {
+  double most = 0;
+  for (const Vec3& row : m.row)
+    most = std::max(most, std::abs(row.x) + std::abs(row.y) + std::abs(row.z));
+  return most;
+}
+
+void check_within_reach(const Affine& m, const std::string& path) {
+  for (const Vec3& v : {m.linear.row[0], m.linear.row[1], m.linear.row[2], m.translation})
+    if (!is_finite(v)) fail(path, " holds numbers that are not finite.");
+  for (const Vec3& v : {m.linear.row[0], m.linear.row[1], m.linear.row[2], m.translation})
+    if (!(largest(v) <= kFarthest))
+      fail(path, " holds ", largest(v), "; give places and scales of at most ", kFarthest, ".");
+}
+
 void check_transform(const Affine& m, const std::string& path) {
+  check_within_reach(m, path);
   double size = 1;
-  for (const Vec3& row : m.linear.row) {
-    if (!is_finite(row)) fail(path, " holds numbers that are not finite.");
-    size *= length(row);
-  }
-  if (!is_finite(m.translation)) fail(path, " holds numbers that are not finite.");
+  for (const Vec3& row : m.linear.row) size *= length(row);
   if (!(std::abs(determinant(m.linear)) > 1e-12 * size))
     fail(path, " flattens space (its determinant is ", determinant(m.linear),
          "): the object has no size along some axis. Give it a scale other than zero.");
@@ -60,19 +85,25 @@ void check_settings(const SettingsDescription& s) {
 }
 
 void check_camera(const CameraDescription& c) {
-  for (int i = 0; i < 3; ++i) {
-    const Mat3 columns = transpose(c.matrix.linear);
-    if (!is_finite(columns.row[i]) || !(length(columns.row[i]) > 0))
-      fail("camera.matrix has an axis of length zero or numbers that are not finite.");
+  check_within_reach(c.matrix, "camera.matrix");
+  Mat3 axes = transpose(c.matrix.linear);
+  for (Vec3& axis : axes.row) {
+    if (!(length(axis) > 0)) fail("camera.matrix has an axis of length zero.");
+    axis = normalize(axis);
   }
-  if (!is_finite(c.matrix.translation)) fail("camera.matrix holds numbers that are not finite.");
+  if (!(std::abs(determinant(axes)) > 1e-12))
+    fail("camera.matrix flattens space; give three axes that do not lie in a plane.");
+  check_between(c.shift_x, -kFarthest, kFarthest, "camera.shift[0]");
+  check_between(c.shift_y, -kFarthest, kFarthest, "camera.shift[1]");
   if (c.type == CameraDescription::Type::perspective && !(c.fov_x > 0 && c.fov_x < kPi))
     fail("camera.fov_x is ", c.fov_x, "; give an angle between 0 and π radians.");
-  if (c.type == CameraDescription::Type::orthographic && !(c.width > 0 && c.width < kInfinity))
-    fail("camera.width is ", c.width, "; give a positive width in metres.");
-  if (!(c.clip_near >= 0 && c.clip_near < c.clip_far && c.clip_near < kInfinity))
+  if (c.type == CameraDescription::Type::orthographic && !(c.width > 0 && c.width <= kFarthest))
+    fail("camera.width is ", c.width, "; give a positive width in metres, at most ", kFarthest,
+         ".");
+  check_between(c.clip_near, 0, kFarthest, "camera.clip[0]");
+  if (!(c.clip_near < c.clip_far))
     fail("camera.clip is (", c.clip_near, ", ", c.clip_far,
-         "); the near distance must not be negative and must be less than the far one.");
+         "); the near distance must be less than the far one.");
 }
 
 void check_world(const WorldDescription& w) {
@@ -101,12 +132,19 @@ void check_light(const LightDescription& l, const EntryPath& path) {
   check_color(l.color, kInfinity, path + ".color");
   check_at_least(l.power, 0, path + ".power");
   if (l.radiance) check_color(*l.radiance, kInfinity, path + ".radiance");
-  check_at_least(l.radius, 0, path + ".radius");
+  check_size(l.radius, path + ".radius");
   check_between(l.blend, 0, 1, path + ".blend");
-  if (l.type == LightDescription::Type::area && !(l.size_x > 0 && l.size_y > 0))
-    fail(path + ".size", " is (", l.size_x, ", ", l.size_y,
-         "); an area light needs a positive size.");
-  if (l.type == LightDescription::Type::sun) check_between(l.angle, 0, kPi, path + ".angle");
+  if (l.type == LightDescription::Type::area) {
+    if (!(l.size_x > 0 && l.size_y > 0))
+      fail(path + ".size", " is (", l.size_x, ", ", l.size_y,
+           "); an area light needs a positive size.");
+    check_size(l.size_x, path + ".size[0]");
+    check_size(l.size_y, path + ".size[1]");
+  }
+  if (l.type == LightDescription::Type::sun) {
+    check_size(l.angle, path + ".angle");
+    check_between(l.angle, 0, kPi, path + ".angle");
+  }
   if (l.type == LightDescription::Type::spot && !(l.angle > 0 && l.angle <= kPi))
     fail(path + ".angle", " is ", l.angle,
          "; a spot needs a cone of more than 0 and at most π radians.");
@@ -145,8 +183,22 @@ void check_mesh(const MeshDescription& m, const EntryPath& path) {
          " triangles.");
 }
 
-void check_object(const SceneDescription& d, const ObjectDescription& o, const EntryPath& path) {
+// A stochastic object so small against its place, or so flat, that double precision does not tell
+// its points apart in its own space: rays would start far from the surface that they leave.
+void check_resolved(const Affine& m, const std::string& path) {
+  const double across = greatest_row(m.linear) + largest(m.translation);
+  const double ratio = greatest_row(inverse(m.linear)) * across;
+  if (!(ratio <= 1e12))
+    fail(path, " makes the object ", ratio,
+         " times smaller (along some axis) than its distance from the origin or its length; double "
+         "precision does not resolve it. Give it more even scales, or a place nearer to the "
+         "origin.");
+}
+
+void check_object(const SceneDescription& d, const std::vector<double>& farthest_vertex,
+                  const ObjectDescription& o, const EntryPath& path) {
   check_transform(o.matrix, path + ".matrix");
+  if (o.type == ObjectDescription::Type::gpis) check_resolved(o.matrix, path + ".matrix");
   for (const int m : o.materials)
     if (m < 0 || m >= static_cast<int>(d.materials.size()))
       fail(path + ".materials", " names a material that is not in `materials`.");
@@ -160,6 +212,11 @@ void check_object(const SceneDescription& d, const ObjectDescription& o, const E
   }
   if (o.mesh < 0 || o.mesh >= static_cast<int>(d.meshes.size()))
     fail(path + ".mesh", " names a mesh that is not in `meshes`.");
+  const double reach =
+      farthest_vertex[o.mesh] * greatest_row(o.matrix.linear) + largest(o.matrix.translation);
+  if (!(reach <= kFarthest))
+    fail(path + ".matrix", " takes vertices of the mesh as far as ", reach,
+         " from the origin; keep within ", kFarthest, ".");
   if (o.materials.empty()) fail(path + ".materials", " is empty; name at least one material.");
   const auto& index = d.meshes[o.mesh].material_index;
   for (std::size_t i = 0; i < index.size(); ++i)
@@ -180,8 +237,14 @@ void check(const SceneDescription& d) {
     check_material(d.materials[i], EntryPath("materials", d.materials[i].name));
   for (std::size_t i = 0; i < d.meshes.size(); ++i)
     check_mesh(d.meshes[i], EntryPath("meshes", d.meshes[i].name));
+  std::vector<double> farthest_vertex;
+  for (const MeshDescription& m : d.meshes) {
+    double farthest = 0;
+    for (const float v : m.vertices) farthest = std::max(farthest, std::abs(double{v}));
+    farthest_vertex.push_back(farthest);
+  }
   for (std::size_t i = 0; i < d.objects.size(); ++i)
-    check_object(d, d.objects[i], EntryPath("objects", i, d.objects[i].name));
+    check_object(d, farthest_vertex, d.objects[i], EntryPath("objects", i, d.objects[i].name));
 }
 
 }  // namespace gpis

@@ -14,6 +14,10 @@
 
 namespace gpis {
 
+// Coordinates of a scene end here: those of single precision, which Embree takes, end at 1.8e18,
+// and a ray from beyond would end the program.
+inline constexpr double kFarthest = 1e15;
+
 struct SettingsDescription {
   std::optional<int> max_bounces;  // indirect bounces: 0 = direct light only; none = unlimited
   double missed_root = 1e-3;       // probability of a missed root per ray

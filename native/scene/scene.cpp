@@ -1,5 +1,6 @@
 #include "scene/scene.h"
 
+#include <sstream>
 #include <stdexcept>
 
 #include "scene/check.h"
@@ -51,6 +52,17 @@ std::unique_ptr<Light> make_world(const WorldDescription& w) {
 
 bool is_black(const WorldDescription& w) {
   return w.strength == 0 || (w.image.empty() && max_component(w.color) == 0);
+}
+
+void check_bounds(const Box3& bounds, const std::string& path) {
+  for (int i = 0; i < 3; ++i)
+    for (const double end : {std::abs(bounds.min[i]), std::abs(bounds.max[i])})
+      if (end > kFarthest && end < kInfinity) {
+        std::ostringstream sentence;
+        sentence << path << " takes the bounds of the process as far as " << end
+                 << " from the origin; keep within " << kFarthest << ".";
+        throw std::invalid_argument(sentence.str());
+      }
 }
 
 // Of the sphere about all finite bounds; 1 if there are none.
@@ -105,6 +117,7 @@ void Scene::build_objects() {
                                     error.what());
       }
       const TreeSurface& surface = impl_->bodies.back().surface;
+      check_bounds(surface.bounds(), EntryPath("objects", i, o.name) + ".matrix");
       for (std::size_t k = 0; k < surface.leaves().size(); ++k) {
         const int material = o.materials[o.materials.size() == 1 ? 0 : k];
         impl_->stochastic.push_back({surface.leaves()[k], impl_->materials[material].get(),

@@ -155,6 +155,18 @@ WRONG = [
     ("meshes.flat.material_index", [0, 1], "meshes['flat'].material_index: takes integers of shape (1,), got"),
     ("meshes.flat.material_index", [2], "objects[0].materials"),
     ("meshes.flat.material_index", [-1], "objects[0].materials"),
+    # Numbers that Embree, or double precision, cannot take
+    ("camera.matrix", 1e20 * np.diag([1, 1, 1, 1e-20]), "camera.matrix holds 1e+20; give places and scales of at most"),
+    ("camera.matrix", np.array([[1, 0, 0, 1e19], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]), "camera.matrix holds 1e+19"),
+    ("camera.matrix", np.array([[1, 0, 1, 0], [0, 1, 0, 0], [1, 0, 1, 0], [0, 0, 0, 1]]), "camera.matrix flattens space"),
+    ("camera.shift", (1e300, 0), "camera.shift[0] is 1e+300"),
+    ("camera.clip", (1e16, np.inf), "camera.clip[0] is 1e+16"),
+    ("lights.0.radius", 1e-160, "lights[0].radius of 'P' is 1e-160; give a number from 1e-30 to 1e+30"),
+    ("lights.1.angle", 1e-160, "lights[1].angle of 'S' is 1e-160"),
+    ("lights.2.size", (1, 1e160), "lights[2].size[1] of 'A' is 1e+160"),
+    ("objects.0.matrix", np.diag([1e14, 1, 1, 1]) @ np.array([[1, 0, 0, 20], *np.eye(4)[1:]]), "objects[0].matrix"),
+    ("meshes.flat.vertices", [(0, 0, 0), (1e20, 0, 0), (0, 1, 0)], "objects[0].matrix of 'One' takes vertices of the mesh"),
+    ("objects.3.matrix", np.diag([1, 1, 1e-13, 1.0]), "objects[3].matrix of 'Body' makes the object"),
     # Names that lead nowhere
     ("objects.0.mesh", "cube", "objects[0].mesh: there is no mesh 'cube' (the description has 'corners', 'flat',"),
     ("objects.1.materials", ["steel"], "objects[1].materials[0]: there is no material 'steel'"),
@@ -189,6 +201,14 @@ def test_wrong_input_gets_a_sentence(path, value, words):
         gn.Scene(description)
     assert words in str(error.value)
     assert str(error.value).startswith(words.split(" ")[0].split(":")[0])
+
+
+def test_bounds_end_where_single_precision_does():
+    description = full()
+    process = gn.GaussianProcess(gn.ConstantField(0), 1, gn.SquaredExponential(1), bounds=((-2,) * 3, (2,) * 3))
+    description["objects"][3] |= {"process": process, "matrix": np.diag([9e14, 9e14, 9e14, 1.0])}
+    with pytest.raises(ValueError, match=r"objects\[3\].matrix of 'Body' takes the bounds of the process as far as 1.8e\+15"):
+        gn.Scene(description)
 
 
 def test_a_description_is_a_dict():

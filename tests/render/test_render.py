@@ -2,6 +2,9 @@
 
 import json
 import logging
+import os
+import subprocess
+import sys
 import threading
 import time
 
@@ -384,3 +387,44 @@ def test_save_replaces_only_files(tmp_path):
         with pytest.raises(ValueError, match="save: path"):
             result.save(path)
     assert [entry.name for entry in tmp_path.iterdir()] == ["folder"]
+
+
+@pytest.mark.parametrize("clip", [(0, np.inf), (1e15, np.inf)])
+def test_no_ray_starts_beyond_the_coordinates_that_embree_takes(clip):
+    """It would end the program there. A medium without bounds has surfaces as far away, a near plane may lie there."""
+    medium = gn.GaussianProcess(gn.ConstantField(0.5), 1.0, gn.SquaredExponential(1e20))
+    scene = gn.Scene(
+        {
+            "version": 1,
+            "camera": {"type": "perspective", "matrix": np.eye(4), "fov_x": 3.1415, "clip": clip},
+            "world": {"color": (1, 1, 1)},
+            "materials": {"white": {"type": "lambert", "color": (1, 1, 1)}},
+            "meshes": {"m": {"vertices": [(0, 0, 9), (1, 0, 9), (0, 1, 9)], "triangles": [(0, 1, 2)]}},
+            "objects": [
+                {"name": "Mesh", "type": "mesh", "mesh": "m", "materials": ["white"]},
+                {"name": "Medium", "type": "gpis", "process": medium, "materials": ["white"]},
+            ],
+        }
+    )
+    result = gn.render(scene, 8, 8, samples=16)
+    assert result.stats["nan_samples"] == 0
+    np.testing.assert_allclose(result.passes["combined"], 1, atol=1e-6)
+
+
+HUGE = """
+import resource
+resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
+import gpis_native as gn
+import numpy as np
+camera = {"type": "orthographic", "matrix": np.eye(4), "width": 1.0}
+try:
+    gn.render(gn.Scene({"version": 1, "camera": camera}), 65536, 65536, samples=1)
+except RuntimeError as error:
+    print(error)
+"""
+
+
+@pytest.mark.skipif("GPIS_SANITIZE" in os.environ, reason="a module built with a sanitizer has its own way to run out of memory")
+def test_a_picture_that_memory_does_not_hold_gets_a_sentence():
+    said = subprocess.run([sys.executable, "-c", HUGE], capture_output=True, text=True)
+    assert said.stdout.startswith("A picture of 65536 x 65536 pixels takes "), said
