@@ -2,6 +2,7 @@
 
 import json
 import math
+from pathlib import Path
 
 # Name of scene -> record of its last render. Plain values, never Blender's.
 _last = {}
@@ -53,6 +54,7 @@ def write(entry, path):
 
     So `estimated_error`, which takes two samples a pixel, is null after one.
     """
+    Path(path).parent.mkdir(parents=True, exist_ok=True)  # as Blender does for the image, after the render
     with open(path, "w", encoding="utf-8") as file:
         json.dump(entry, file, indent=1, allow_nan=False)
         file.write("\n")

@@ -158,14 +158,16 @@ class _Bake:
     )
 
     def run(self, bake_one, objects):
+        result = {"CANCELLED"}
         for obj in objects:
             try:
                 volume_object, report = bake_one(obj)
             except (ValueError, RuntimeError, OSError) as error:
                 self.report({"ERROR"}, f'"{obj.name}": {error}')
-                return {"CANCELLED"}
+                return result
             self.report({"INFO"}, note(volume_object, report))
-        return {"FINISHED"}
+            result = {"FINISHED"}  # something to undo, whatever becomes of the others
+        return result
 
 
 class GPIS_OT_make(_Bake, bpy.types.Operator):

@@ -1,5 +1,7 @@
 """Lights -> `lights` of the description."""
 
+import math
+
 import numpy as np
 
 from . import nodes
@@ -22,7 +24,7 @@ def add(sync, obj, matrix_world):
     placed[:3, :3] /= np.where(scale > 0, scale, 1)
     entry = {"name": obj.name, "type": light.type.lower(), "matrix": placed, "color": color, "power": power}
     if light.type == "SUN":
-        entry["angle"] = light.angle
+        entry["angle"] = min(light.angle, math.pi)  # Blender's greatest is π in single precision
     elif light.type == "AREA":
         if not np.all(scale[:2] > 0):
             sync.warn(f'Light "{obj.name}" gives no light: it is scaled to zero.')
@@ -35,7 +37,7 @@ def add(sync, obj, matrix_world):
     else:
         entry["radius"] = light.shadow_soft_size
         if light.type == "SPOT":
-            entry["angle"] = light.spot_size
+            entry["angle"] = min(light.spot_size, math.pi)
             entry["blend"] = light.spot_blend
     sync.description["lights"].append(entry)
 

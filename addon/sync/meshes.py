@@ -10,9 +10,13 @@ from .state import SyncError, array
 
 def add(sync, obj, matrix_world):
     mesh = obj.data
+    matrix = array(matrix_world)
     names = materials.of_object(sync, obj)
     # Instances share the evaluated mesh: one entry for all of them, told apart by its address within this evaluation.
     key = f"{mesh.name_full} {mesh.as_pointer():x}"
+    flattened = _flattens(matrix)
+    if flattened:  # a mesh of its own, in the world
+        key += f" of {obj.name} {len(sync.description['objects'])}"
     if key not in sync.description["meshes"]:
         arrays = describe(mesh, len(names))
         if arrays is None:
@@ -23,12 +27,21 @@ def add(sync, obj, matrix_world):
                 f'Object "{obj.name}": vertex {bad[0]} of its mesh (modifiers applied) has a coordinate that is not a '
                 "finite number. Delete the vertex, or look for the modifier that made it."
             )
+        if flattened:
+            arrays["vertices"] = arrays["vertices"] @ matrix[:3, :3].T + matrix[:3, 3]
+            arrays.pop("normals", None)  # all in one plane
         sync.description["meshes"][key] = arrays
         sync.mesh_owners[key] = obj.name
     _warn_about_flags(sync, obj)
     sync.description["objects"].append(
-        {"name": obj.name, "type": "mesh", "mesh": key, "matrix": array(matrix_world), "materials": names}
+        {"name": obj.name, "type": "mesh", "mesh": key, "matrix": np.eye(4) if flattened else matrix, "materials": names}
     )
+
+
+def _flattens(matrix):
+    """Scaled to zero along an axis or two, as artists flatten meshes: the transform has no inverse, the faces are there."""
+    linear = matrix[:3, :3]
+    return linear.any() and abs(np.linalg.det(linear)) <= 1e-12 * np.prod(np.linalg.norm(linear, axis=1))
 
 
 def triangles(mesh):

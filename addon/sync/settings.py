@@ -7,7 +7,7 @@ def describe(sync):
     if scene.render.use_motion_blur:
         sync.warn("Motion blur is off in this picture: the GPIS engine does not render it.")
     if scene.render.use_freestyle:
-        sync.warn("Freestyle is on: the GPIS engine does not draw its lines..")
+        sync.warn("Freestyle is on: the GPIS engine does not draw its lines.")
     if scene.render.film_transparent:
         sync.warn("The background stays in this picture: the GPIS engine does not render Transparent film.")
     return {

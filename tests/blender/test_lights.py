@@ -28,6 +28,8 @@ LIGHTS = {
     },
     "disk": {"kind": "AREA", "energy": 200, "rotation": SLANTED, "shape": "DISK", "size": 1.5},
     "ellipse": {"kind": "AREA", "energy": 200, "rotation": SLANTED, "shape": "ELLIPSE", "size": 2, "size_y": 0.7},
+    "widest sun": {"kind": "SUN", "energy": 3, "rotation": SLANTED, "angle": math.pi},
+    "widest spot": {"kind": "SPOT", "energy": 500, "rotation": SLANTED, "spot_size": math.pi, "spot_blend": 0.4},
     "spot": {"kind": "SPOT", "energy": 500, "rotation": SLANTED, "spot_size": 1.2, "spot_blend": 0.4},
 }
 

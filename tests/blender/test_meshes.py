@@ -26,6 +26,13 @@ def test_modifiers_are_applied(stage, tmp_path):
     support.same_pictures(stage, tmp_path)
 
 
+def test_flattened_by_its_scale(stage, tmp_path):
+    """Zero along one axis: the object has faces all the same."""
+    red = support.diffuse("Red", (0.7, 0.1, 0.1))
+    support.plane(stage, "Sheet", 2, red, location=(0, 0, 0.9), rotation=(0.9, 0.4, 0.1, 0.4), scale=(1, 0.7, 0))
+    support.same_pictures(stage, tmp_path)
+
+
 def test_several_materials_on_one_mesh(stage, tmp_path):
     box = support.cube(stage, "Box", 1.6, support.diffuse("Red", (0.7, 0.1, 0.1)), location=(0, 0, 0.8))
     box.data.materials.append(support.diffuse("Green", (0.1, 0.7, 0.1)))

@@ -124,6 +124,13 @@ def test_statistics_beside_the_image_and_by_operator(stage, tmp_path):
     assert json.loads((tmp_path / "saved.json").read_text()) == entry
 
 
+def test_statistics_go_where_the_image_goes(stage, tmp_path):
+    """Blender makes the folder, but after the render."""
+    stage.gpis.write_statistics = True
+    support.picture(stage, tmp_path / "new" / "folder")
+    assert (tmp_path / "new" / "folder" / "GPIS-0.json").exists()
+
+
 def test_statistics_are_strict_json(stage, tmp_path):
     """A single sample has no error estimate: null, for JSON knows no infinity."""
     stage.gpis.write_statistics, stage.gpis.samples = True, 1
