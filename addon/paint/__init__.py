@@ -9,6 +9,8 @@ bake.fields(obj).first_surface(origin, direction)              # what is under t
 conditions.pin(obj, [location]); conditions.erase(obj, [location], radius)
 """
 
+import logging
+
 import bpy
 from bpy.app.handlers import persistent
 
@@ -16,10 +18,23 @@ from . import bake, modal, operators, tool
 
 _PARTS = (operators, modal, tool)
 
+_log = logging.getLogger(__name__)
+
 
 @persistent
 def _after_load(*_):
     bake.forget()
+
+
+@persistent
+def _after_undo(*_):
+    try:
+        bake.rebuild_missing()
+    except (ValueError, OSError) as error:
+        _log.error(str(error))  # the render says the same of the file that is missing
+
+
+_HANDLERS = (("load_post", _after_load), ("undo_post", _after_undo), ("redo_post", _after_undo))
 
 
 def register():
@@ -28,11 +43,13 @@ def register():
     )
     for part in _PARTS:
         part.register()
-    bpy.app.handlers.load_post.append(_after_load)
+    for name, handler in _HANDLERS:
+        getattr(bpy.app.handlers, name).append(handler)
 
 
 def unregister():
-    bpy.app.handlers.load_post.remove(_after_load)
+    for name, handler in _HANDLERS:
+        getattr(bpy.app.handlers, name).remove(handler)
     for part in reversed(_PARTS):
         part.unregister()
     bake.forget()

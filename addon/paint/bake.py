@@ -247,6 +247,7 @@ def commit(obj, opened, text):
     path = files.new_path(files.name_of(data.filepath))
     opened.write(str(path), text.encode())
     files.point(data, path)
+    files.trim()
     data.gpis_strokes = text
     take(obj, opened.painted())
     forget()
@@ -292,7 +293,6 @@ def rebase(obj):
     if not text:
         obj.data.gpis_strokes = ""
         return
-    check(obj)
     try:
         opened = _opened(_source(obj, volume.path_of(obj.data), base=True))
         replayed(opened, text)
@@ -316,6 +316,15 @@ def rebuild(obj, voxel_size=None):
     except (ValueError, OSError, RuntimeError) as error:
         raise ValueError(f"{owner_of(obj)}: {error}") from error
     commit(obj, opened, data.gpis_strokes)
+
+
+def rebuild_missing():
+    """Paint again what undo came back to, and is no longer on disk."""
+    for obj in bpy.data.objects:
+        if obj.type == "VOLUME" and obj.library is None and obj.data.library is None and obj.data.gpis_strokes:
+            path = Path(bpy.path.abspath(obj.data.filepath))
+            if not path.is_file() and not obj.data.packed_file and files.versions_of(path):
+                rebuild(obj)
 
 
 def _newest(data):

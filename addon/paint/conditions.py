@@ -5,13 +5,19 @@ import numpy as np
 
 from . import bake
 
+# Of the deviation there: as good as exact to the eye. Points painted close to each other all but determine one another
+# where the kernel is smooth, and the last digits of a grid would contradict it.
+_NOISE = 0.02
+
 
 def pin(obj, locations, normals=None, slope=None):
     """Pin the surface at places in object space; normals (N, 3), or those of the mean there. `slope`: how steeply the
     process rises, or as the mean does."""
     bake.check(obj)
     locations = _points(locations)
-    gradients = _gradients(bake.fields(obj), locations)
+    fields = bake.fields(obj)
+    gradients = _gradients(fields, locations)
+    deviations = fields.values("deviation", locations)
     steepness = np.linalg.norm(gradients, axis=1)
     normals = gradients if normals is None else _points(normals)
     lengths = np.linalg.norm(normals, axis=1)
@@ -25,6 +31,7 @@ def pin(obj, locations, normals=None, slope=None):
         point = obj.gpis.conditions.add()
         point.location = place
         point.normal = normals[i] / lengths[i]
+        point.noise = _NOISE * deviations[i]
         point.slope = slope if slope is not None else (steepness[i] if steepness[i] > 0 else 1.0)
 
 

@@ -295,8 +295,13 @@ class GPIS_OT_paint_resample(_OnObject, bpy.types.Operator):
     )
 
     def invoke(self, context, event):
-        low, high = np.array(bake.fields(context.active_object).bounds())
-        voxel = min(bake.fields(context.active_object).voxel_size())
+        try:
+            fields = bake.fields(context.active_object)
+        except ValueError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        low, high = np.array(fields.bounds())
+        voxel = min(fields.voxel_size())
         self.resolution = round((high - low).max() / voxel) + 1
         return context.window_manager.invoke_props_dialog(self)
 

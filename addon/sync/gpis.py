@@ -4,6 +4,7 @@ import numpy as np
 
 from .. import volume
 from ..native import native
+from ..paint import conditions
 from . import kernel, materials
 from .kernel import check_positive
 from .state import SyncError, array
@@ -83,6 +84,7 @@ def _process(sync, owner, obj):
         sigma,
         kernel.describe(owner, settings),
         anisotropy=_anisotropy(owner, settings, path),
+        conditions=conditions.arrays(obj),
         bounds=(mean_grid["min"], mean_grid["max"]),
     )
 

@@ -96,12 +96,8 @@ def fresh_blender(tmp_path):
     def run(script, *arguments, timeout=300):
         path = tmp_path / "script.py"
         path.write_text(script)
-        if not bpy.app.binary_path:  # the module; bpy.app.module is younger than 4.3
-            command = [sys.executable, "-c", f"import bpy, runpy; runpy.run_path({str(path)!r}, run_name='__main__')"]
-        else:
-            command = [bpy.app.binary_path, "-b", "--factory-startup", "--python-exit-code", "1", "--python", path]
         return subprocess.run(
-            [*map(str, command), "--", *map(str, arguments)],
+            [*support.command(path), "--", *map(str, arguments)],
             env={**os.environ, "BLENDER_USER_RESOURCES": str(resources)},
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,

@@ -1,6 +1,7 @@
 """Scenes, renders and comparisons that the Blender tests share."""
 
 import struct
+import sys
 
 import bpy
 import numpy as np
@@ -39,6 +40,13 @@ def read_exr(path):
             channels[name][height - 1 - row] = np.frombuffer(data, dtype, width, offset)
             offset += size * width
     return channels, attributes
+
+
+def command(script):
+    """Runs a script in a new Blender of the same kind."""
+    if not bpy.app.binary_path:  # the module; bpy.app.module is younger than 4.3
+        return [sys.executable, "-c", f"import bpy, runpy; runpy.run_path({str(script)!r}, run_name='__main__')"]
+    return [bpy.app.binary_path, "-b", "--factory-startup", "--python-exit-code", "1", "--python", str(script)]
 
 
 def image_settings(scene, multilayer=False):
