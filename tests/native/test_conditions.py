@@ -328,3 +328,38 @@ def test_samplers_that_see_the_start_alone_are_refused():
     gp = process(conditions={"points": [[0, 0, 0]], "values": [0]})
     with pytest.raises(ValueError, match="with conditions"):
         gn.first_hits(gp, [[0, 0, 3.0]], [[0, 0, -1.0]], 10, sampler="convolution")
+
+
+def test_lines_across_many_blocks(seed, full_size):
+    """A line that goes from block to block follows the posterior of all conditions together."""
+    n = 20_000 if full_size else 3000
+    rng = np.random.default_rng(8)
+    x = np.linspace(-3, 9, 160)
+    points = np.column_stack([x, 0.35 * np.cos(7 * x), 0.35 * np.sin(7 * x)])
+    c = {"points": points, "values": 2.0 + 0.2 * rng.normal(size=160), "normals": np.full((160, 3), np.nan)}
+    c |= {"slopes": np.ones(160), "noise": np.full(160, 0.15)}
+    far, sigma = gn.ConstantField(2.0), gn.ConstantField(0.35)
+    gp = gn.GaussianProcess(far, sigma, gn.SquaredExponential(0.5), conditions=c)
+    assert int(gp.plan()["conditions"].split(" blocks")[0].split()[-1]) >= 2
+    t = np.array([1.0, 2.9, 3.2, 4.4, 5.8, 6.0, 6.2, 7.5, 9.0])
+    o, d = np.array([-3.0, 0.05, 0]), np.array([1.0, 0, 0])
+    f = gn.line_values(gp, np.tile(o, (n, 1)), np.tile(d, (n, 1)), t, tolerance=1e-9, seed=seed)
+    f = f[np.isfinite(f).all(axis=1)]
+    assert len(f) > 0.99 * n
+    law = Regression(gn.GaussianProcess(far, sigma, gn.SquaredExponential(0.5)), c, far, sigma).law(o + t[:, None] * d)
+    check_law(f, *law, 3e-4)
+
+
+@pytest.mark.parametrize("sampler", ["auto", "dense", "realisation"])
+def test_a_start_outside_follows_the_truncated_posterior(sampler, seed, full_size):
+    """Definitions B4 beside a condition: f at the start is the posterior's law given f > 0."""
+    n = 20_000 if full_size else 3000
+    c = {"points": np.array([[0.0, 0.3, 0]]), "values": np.array([-0.6])}
+    gp = gn.GaussianProcess(0.0, 1.0, gn.SquaredExponential(0.5), conditions=c)
+    start, direction = np.zeros((n, 3)), np.tile([0.0, 0, 1.0], (n, 1))
+    mean, variance = (v[0] for v in gp.posterior(np.zeros((1, 3))))
+    assert mean < -0.4  # most draws are not outside
+    f = gn.line_values(gp, start, direction, [1e-9], sampler=sampler, seed=seed)[:, 0]
+    draws = mean + np.sqrt(variance) * np.random.default_rng(seed).normal(size=100_000)
+    assert (draws > 0).sum() > 10_000
+    check_same_distribution(f, draws[draws > 0])
