@@ -23,8 +23,8 @@ _KEPT = 2
 _VOLUME_CODE = int.from_bytes(b"VO", "little")
 # Files made or used since the last load: undo may bring any of them back.
 _session = set()
-# Those made since the last save or load, which no .blend on disk points at, the oldest first.
-_unsaved = []
+# Those that can be made again out of any later one, and that no .blend on disk points at, the oldest first.
+_repeatable = []
 # So much of them stays on disk, two hundred strokes of an ordinary object. What undo finds missing is painted again.
 _MOST_BYTES = 2 << 30
 # (volume, its former file) of the save in hand.
@@ -39,19 +39,23 @@ def folder(blend_path):
     return path.parent / f"{path.stem}_gpis"
 
 
-def new_path(name):
-    """A path that was never used for this name; its folder is made."""
+def new_path(name, *, repeatable=False):
+    """A path that was never used for this name; its folder is made. `repeatable`: what undo finds missing of it can be
+    made again out of the next version that is left."""
     place = folder(bpy.data.filepath)
     place.mkdir(parents=True, exist_ok=True)
     path = _remember(_next(place, bpy.path.clean_name(name) or "gpis"))
-    _unsaved.append(path)
+    if repeatable:
+        _repeatable.append(path)
+    else:
+        _repeatable.clear()
     return path
 
 
 def trim():
-    """Delete the oldest files since the last save that no volume uses, where there are too many of them."""
+    """Delete the oldest repeatable files that no volume uses, where there are too many of them."""
     used = {path for _, path in _baked()}
-    left = [path for path in _unsaved if path.is_file()]
+    left = [path for path in _repeatable if path.is_file()]
     size = sum(path.stat().st_size for path in left)
     for path in left:
         if size <= _MOST_BYTES:
@@ -180,7 +184,7 @@ def _after_save(blend_path, _=None):
         for volume, filepath in _adopted:  # Save Copy: the copy has files of its own, this .blend keeps its
             volume.filepath = filepath
     _adopted.clear()
-    _unsaved.clear()
+    _repeatable.clear()
     _session.update(path for _, path in _baked())
     collect()
 
@@ -188,7 +192,7 @@ def _after_save(blend_path, _=None):
 @persistent
 def _after_load(blend_path, _=None):
     _session.clear()
-    _unsaved.clear()
+    _repeatable.clear()
     restore()
     _session.update(path for _, path in _baked())
     collect()

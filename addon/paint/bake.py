@@ -136,7 +136,8 @@ class Painting:
     def finish(self):
         """Bake the stroke; what it changed, as counts."""
         if len(self.stroke.dabs) or self.stroke.brush.operation in strokes.WHOLE:
-            commit(self.object, self.fields, strokes.appended(self._before, self.stroke))
+            text = strokes.appended(self._before, self.stroke)
+            commit(self.object, self.fields, text, repeatable=self.stroke.brush.operation != "copy")
         return self.counts
 
     def cancel(self):
@@ -238,13 +239,14 @@ def extend(obj, by):
     painting.finish()
 
 
-def commit(obj, opened, text):
-    """Write native fields to a new version of the object's file, and give it that and the strokes."""
+def commit(obj, opened, text, repeatable):
+    """Write native fields to a new version of the object's file, and give it that and the strokes. `repeatable`: the
+    strokes on what the file was before make it again."""
     data = obj.data
     # σ and ℓ are the object's: what is painted with them is, too.
     if data.library is not None or any(other.data == data and other != obj for other in bpy.data.objects):
         data = obj.data = data.copy()
-    path = files.new_path(files.name_of(data.filepath))
+    path = files.new_path(files.name_of(data.filepath), repeatable=repeatable)
     opened.write(str(path), text.encode())
     files.point(data, path)
     files.trim()
@@ -298,16 +300,16 @@ def rebase(obj):
         replayed(opened, text)
     except (ValueError, OSError, RuntimeError) as error:
         raise ValueError(f"{owner_of(obj)}: its strokes could not be painted again: {error}") from error
-    commit(obj, opened, text)
+    commit(obj, opened, text, repeatable=False)
 
 
 def rebuild(obj, voxel_size=None):
-    """Paint all strokes again, on voxels of another size if one is given, and where the object's file is gone on what
-    the newest other version of it holds."""
+    """Paint all strokes again, on voxels of another size if one is given; where the object's file is gone, on what
+    another version of it holds."""
     check(obj)
     data = obj.data
     try:
-        source = _source(obj, str(_newest(data)))
+        source = _source(obj, str(_present(data)))
         opened = _opened(source)
         opened.restart()
         if voxel_size is not None:
@@ -315,7 +317,7 @@ def rebuild(obj, voxel_size=None):
         replayed(opened, data.gpis_strokes)
     except (ValueError, OSError, RuntimeError) as error:
         raise ValueError(f"{owner_of(obj)}: {error}") from error
-    commit(obj, opened, data.gpis_strokes)
+    commit(obj, opened, data.gpis_strokes, repeatable=voxel_size is None)
 
 
 def rebuild_missing():
@@ -327,10 +329,13 @@ def rebuild_missing():
                 rebuild(obj)
 
 
-def _newest(data):
+def _present(data):
+    """A volume's file, or the next version of it, which goes back to the same before anything was painted."""
     path = Path(os.path.normpath(bpy.path.abspath(data.filepath, library=data.library)))
     others = files.versions_of(path)
-    return path if path.is_file() or not others else others[-1]
+    if path.is_file() or not others:
+        return path
+    return next((other for other in others if (len(other.name), other.name) > (len(path.name), path.name)), others[-1])
 
 
 def recoverable(data):
