@@ -147,12 +147,12 @@ void TreeMarch::begin(int noise, double a) {
   n.line->stretches.push_back({a, a, 0});
   std::vector<Cut> cuts = std::move(cuts_);
   find_cuts(noise, a, cuts);
-  if (outside_ && !cuts.empty()) {
-    const int part = choose_part(noise, a, p.g, cuts);
+  const int part = outside_ && !cuts.empty() ? choose_part(noise, a, p.g, cuts) : -1;
+  if (part >= 0 && deviation > 0) {
     const double low = part > 0 ? cuts[part - 1].g : -kInfinity;
     const double high = part < static_cast<int>(cuts.size()) ? cuts[part].g : kInfinity;
     // A draw that is in the part already follows its law.
-    if (part >= 0 && deviation > 0 && !(p.g > low && p.g < high)) {
+    if (!(p.g > low && p.g < high)) {
       PathStart known;
       known.value = mean + deviation * truncated_normal((low - mean) / deviation,
                                                         (high - mean) / deviation, *rng_);
