@@ -1,8 +1,8 @@
 """Sampler against sampler: two-sample tests of (t, gradient) at first hits and at the hits of rays reflected there, over
 every kernel x memory x anisotropy x mean and all samplers that serve the kernel (issue "the process, exact", must show 2).
 
-Each comparison has the significance of statistics_checks.py: all of them together (some 4,000 at full size) raise a false alarm with
-probability below 1e-3 (Bonferroni). Memory `global` is one sampler's: test_realisation_path.py.
+Each comparison has the significance of statistics_checks.py: all of them together (some 4,000 at full size) raise a false
+alarm with probability below 1e-3 (Bonferroni). Memory `global`: test_realisation_path.py, test_segment_memory.py.
 """
 
 from dataclasses import dataclass
@@ -71,9 +71,9 @@ CASES = {
 
 def number_of_rays(case, sampler, full_size):
     if sampler == "realisation":
-        return 2000 if full_size else 300
+        return 1000 if full_size else 300
     if sampler == "nystrom" or (sampler == "dense" and case.joint):
-        return 10_000 if full_size else 500
+        return 5000 if full_size else 500
     return 60_000 if full_size else 6000
 
 
