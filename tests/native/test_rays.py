@@ -109,6 +109,22 @@ def test_along_the_constant_axis_of_a_height_field(family, n, seed):
     assert np.isinf(up["t"]).all()
 
 
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("family", [gn.SquaredExponential, lambda *a, **k: gn.RationalQuadratic(1, *a, **k)])
+def test_gradients_along_a_turned_constant_axis(family, axis, n, seed):
+    """∇f - ∇μ at the hit has the covariance σ²G: nothing on the line says anything of it, whichever axis is constant."""
+    turn = np.array([0.9, 0.3, -0.2, 0.1]) / np.linalg.norm([0.9, 0.3, -0.2, 0.1])
+    cross = np.cross(turn[1:], np.eye(3)[axis])
+    d = np.eye(3)[axis] + 2 * (turn[0] * cross + np.cross(turn[1:], cross))
+    kernel = family(np.insert([0.3, 0.15], axis, np.inf), rotation=turn)
+    gp = gn.GaussianProcess(gn.PlaneField([0, 0, 0], -d, 1), 0.1, kernel, bounds=((-2, -2, -2), (2, 2, 2)))
+    hits = gn.first_hits(gp, *rays(n, -1.5 * d, d), 10, seed=seed)
+    assert np.isfinite(hits["t"]).all()
+    g, law = hits["gradient"] + d, 0.01 * kernel.mixed([[0, 0, 0]], [[0, 0, 0]])[0, 0]
+    size = np.sqrt(np.outer(np.diag(law), np.diag(law)) + law**2)
+    check_z(g.T @ g / n, law, size / sqrt(n))
+
+
 @pytest.mark.parametrize("lengths", [[0.3, np.inf, 0.2], [0.3, np.inf, np.inf]])
 def test_a_mirror_of_a_grooved_surface(lengths):
     """Gradients in a plane or on a line have no density: a mirror must not be lit through one."""
