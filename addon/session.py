@@ -78,14 +78,14 @@ def next_round(limits, samples, seconds, error):
     return Round(count, time_left)
 
 
-def next_sketch(limits, sketches, seconds, paths):
+def next_sketch(limits, sketches, seconds, paths, patience=PATIENCE):
     """Samples of the sketch that comes after the `sketches` made in `seconds` of `paths` pixels each, 0: none."""
     if len(sketches) == len(SKETCHES) or (limits.samples is not None and limits.samples <= BLOCK):
         return 0
     pace = sum(sketches) * paths / seconds if sketches and seconds > 0 else _PATHS_PER_SECOND
     block = BLOCK * paths / pace
     enough = limits.time_limit is None or 2 * block < limits.time_limit - seconds
-    return SKETCHES[len(sketches)] if block > PATIENCE and enough else 0
+    return SKETCHES[len(sketches)] if block > patience and enough else 0
 
 
 @dataclass
@@ -134,6 +134,7 @@ class Session:
     height: int
     limits: Limits
     sketches: bool = True  # False where nobody waits for a picture
+    patience: float = PATIENCE  # seconds that somebody waits for a block without a sketch
     stop: str = field(default="", init=False)  # what ended it
     history: list = field(default_factory=list, init=False)  # one dict a round: seconds, samples, estimated_error
 
@@ -190,7 +191,7 @@ class Session:
         made = []
         while True:
             seconds = time.monotonic() - self._began
-            count = next_sketch(self.limits, made, seconds, self.width * self.height)
+            count = next_sketch(self.limits, made, seconds, self.width * self.height, self.patience)
             if not count:
                 return True
             result = self._render(count, None, 0)

@@ -88,6 +88,7 @@ def _write_suzanne(radius, path, resolution, margin):
     mesh = bmesh.new()
     try:
         bmesh.ops.create_monkey(mesh, matrix=Matrix.Scale(radius, 4))
+        bmesh.ops.subdivide_edges(mesh, edges=mesh.edges, cuts=2, use_grid_fill=True, smooth=1.0, smooth_falloff="LINEAR")
         bmesh.ops.triangulate(mesh, faces=mesh.faces)
         mesh.verts.index_update()
         vertices = np.array([vertex.co for vertex in mesh.verts], dtype=np.float64)

@@ -84,3 +84,11 @@ def moved(fields, surface):
     """The vertices on the mean surface as it is now: a step of Newton along the gradient as it was."""
     square = np.sum(surface.gradients**2, axis=1, keepdims=True)
     return surface.vertices - fields.values("mean", surface.vertices)[:, None] * surface.gradients / np.maximum(square, 1e-12)
+
+
+def pins(conditions, surface):
+    """Ends (2 N, 3) of lines that stand on the condition points, along their normals."""
+    length = float(np.linalg.norm(surface.high - surface.low)) / 40
+    places = np.array([point.location for point in conditions]).reshape(-1, 3)
+    normals = np.array([point.normal for point in conditions]).reshape(-1, 3)
+    return np.stack([places, places + length * normals], axis=1).reshape(-1, 3)

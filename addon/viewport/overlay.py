@@ -10,6 +10,7 @@ GREY = (0.72, 0.72, 0.72)
 _SHELLS = ((1.0, (0.35, 0.65, 1.0)), (-1.0, (1.0, 0.55, 0.25)))
 _SHELL_OPACITY = 0.22
 _STROKES = (0.05, 0.05, 0.05, 0.9)
+_PINS = (1.0, 0.35, 0.1, 1.0)
 
 # The stroke that is being painted: (name of the object, its live fields), or None; and how often it went on.
 _live = None
@@ -27,6 +28,7 @@ class _Drawn:
         self.batch = None
         self.shells = []
         self.axes = np.empty((0, 3))
+        self.pins = np.empty((0, 3))
         self.legend = None
 
 
@@ -66,7 +68,7 @@ def _shown(context):
     if space is None or space.type != "VIEW_3D" or not space.overlay.show_overlays or space.shading.type == "RENDERED":
         return
     for obj in context.view_layer.objects:
-        if obj.type == "VOLUME" and obj.gpis.enabled and obj.visible_in_viewport_get(space):
+        if obj.type == "VOLUME" and obj.gpis.enabled and obj.visible_get(viewport=space):
             yield obj
 
 
@@ -81,6 +83,7 @@ def _draw_view():
         matrix = obj.matrix_world.copy()
         draw.surface(drawn.batch, matrix, region_data)
         draw.lines(drawn.axes, _STROKES, matrix, width=1.6)
+        draw.lines(drawn.pins, _PINS, matrix, width=4.0)
         for batch in drawn.shells:
             draw.surface(batch, matrix, region_data, _SHELL_OPACITY)
 
@@ -104,6 +107,7 @@ def _refreshed(context, obj, found):
         active and (brush.channel, brush.show_channel, brush.show_shells, brush.show_axes),
         active and (settings.sigma, settings.length_scale, settings.sigma_source, settings.anisotropy),
         tuple(settings.ratios) + tuple(settings.rotation) + tuple(settings.infinite),
+        len(settings.conditions),
         live and _step,
     )
     drawn = _drawn.get(obj.name)
@@ -123,6 +127,8 @@ def _refreshed(context, obj, found):
             drawn.legend = view.legend
         if brush.show_axes and brush.channel == "ANISOTROPY":
             drawn.axes = channels.axes(fields, vertices, normals, found)
+        if brush.channel == "CONDITION":
+            drawn.pins = channels.pins(settings.conditions, found)
         if brush.show_shells:
             drawn.shells = _shells(fields, vertices, normals, found.triangles)
     drawn.batch = draw.surface_batch(vertices, normals, found.triangles, colours)

@@ -52,7 +52,7 @@ class Preview:
             self.scene = native().Scene(self.state.description)
             threads = scene.render.threads if scene.render.threads_mode == "FIXED" else 0
             limits = Limits(samples=scene.gpis.preview_samples, seed=scene.gpis.seed, threads=threads)
-            self.session = Session(native(), self.scene, *size, limits)
+            self.session = Session(native(), self.scene, *size, limits, patience=0.0)
             self.session.start()
         except (ValueError, OSError, RuntimeError) as error:
             self._fail(error)

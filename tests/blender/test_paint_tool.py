@@ -153,6 +153,15 @@ def test_a_moved_mean_moves_what_is_shown(module, sphere, brush):
     painting.cancel()
 
 
+def test_condition_points_are_shown_as_pins(module, sphere):
+    module("paint.conditions").pin(sphere, [(0, 0, 1), (1, 0, 0)])
+    surface, channels = module("viewport.surface").of(sphere), module("viewport.channels")
+    ends = channels.pins(sphere.gpis.conditions, surface).reshape(-1, 2, 3)
+    assert ends[:, 0] == pytest.approx(np.array([(0, 0, 1), (1, 0, 0)]))
+    way = ends[:, 1] - ends[:, 0]
+    assert way / np.linalg.norm(way, axis=1, keepdims=True) == pytest.approx(ends[:, 0], abs=1e-3), "outwards"
+
+
 def test_realisation_as_a_mesh(sphere):
     sphere.location = (0, 0, 3)
     bpy.context.view_layer.update()

@@ -102,10 +102,15 @@ def test_sketches_come_where_the_first_block_takes_long(session, limits, made, s
     assert session.next_sketch(session.Limits(**limits), made, seconds, paths) == expected
 
 
-def test_sketches_are_shown_and_thrown_away(session, monkeypatch):
-    monkeypatch.setattr(session, "PATIENCE", 0.02)
+def test_a_viewport_waits_for_nothing(session):
+    """Its pictures are small, but their samples may take long, and nothing says so before the first."""
+    assert session.next_sketch(session.Limits(samples=64), [], 0.0, 10_000) == 0
+    assert session.next_sketch(session.Limits(samples=64), [], 0.0, 10_000, patience=0.0) == 1
+
+
+def test_sketches_are_shown_and_thrown_away(session):
     renderer = Counting(pace=0.002)
-    running = session.Session(renderer, None, 1000, 1000, session.Limits(samples=100))
+    running = session.Session(renderer, None, 1000, 1000, session.Limits(samples=100), patience=0.02)
     running.start()
     fractions, pictures = [], set()
     while not running.wait(0.001):
@@ -125,10 +130,9 @@ def test_no_sketches_where_nobody_looks(session):
     assert renderer.calls == [(0, 16), (16, 16)]
 
 
-def test_cancel_in_the_first_block_keeps_the_sketch(session, monkeypatch):
-    monkeypatch.setattr(session, "PATIENCE", 0.02)
+def test_cancel_in_the_first_block_keeps_the_sketch(session):
     renderer = Counting(pace=0.01)
-    running = session.Session(renderer, None, 1000, 1000, session.Limits(samples=100))
+    running = session.Session(renderer, None, 1000, 1000, session.Limits(samples=100), patience=0.02)
     running.start()
     while len(renderer.calls) < 3:
         time.sleep(0.001)
