@@ -204,6 +204,41 @@ def test_starts_inside_other_leaves(memory, n, seed):
         check_proportion(np.sum(hits["part"] == k), n, p, error, f"{memory}: part {k}")
 
 
+@pytest.mark.parametrize("memory", ["renewal", "renewal+", "none"])
+@pytest.mark.parametrize("inside_out", [False, True])
+def test_a_tree_of_one_leaf_starts_as_the_process_does(inside_out, memory, n, seed):
+    """Where mean and deviation vary: union with nothing, and the complement seen from inside."""
+    origins, directions = rays(n)
+    mean = gn.PlaneField([0.5, 0, 0], [0.6, 0.64, 0.48], 0.4)
+    sigma = (gn.PlaneField([0, 0, 0], [0.8, -0.6, 0], 0.1) + 0.4).clamped(0.1, 1)
+    gp = gn.GaussianProcess(mean, sigma, gn.SquaredExponential([0.5, 0.8, 0.4]), bounds=BOUNDS)
+    rng = np.random.default_rng(seed)
+    gradient = np.array([0.4, -0.5, 0.6]) + 0.3 * rng.normal(size=(n, 3))
+    gradient[:, 0] = np.abs(gradient[:, 0])
+    sign = -1 if inside_out else 1
+    alone = gn.first_hits(
+        gp,
+        origins,
+        directions,
+        4,
+        memory=memory,
+        start={"value": np.zeros(n), "gradient": sign * gradient},
+        inside=np.full(n, inside_out),
+        seed=seed,
+    )
+    empty = gn.GaussianProcess(10.0, 0.1, gn.SquaredExponential(0.3))
+    tree = gn.union(gn.complement(gp) if inside_out else gp, empty)
+    state = {"value": np.tile([0, np.nan], (n, 1)), "gradient": np.full((n, 2, 3), np.nan)}
+    state["gradient"][:, 0] = sign * gradient
+    leaf = gn.first_hits(tree, origins, directions, 4, memory=memory, start=state, seed=seed + 1)
+    check_same_distribution(alone["t"], leaf["t"], "t")
+    for axis in range(3):
+        found = [h["gradient"][np.isfinite(h["t"]), axis] * s for h, s in ((alone, sign), (leaf, 1))]
+        check_same_distribution(*found, f"gradient {axis}")
+        before = [gradient[np.isfinite(h["t"]), axis] for h in (alone, leaf)]
+        check_same_distribution(found[0] * before[0], found[1] * before[1], f"memory of gradient {axis}")
+
+
 def test_rays_inside(n, seed):
     """Definitions B7: rays inside see -F: those of a tree the complement's, those of a process its own march."""
     tree = TREES["nested"][0]

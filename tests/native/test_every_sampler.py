@@ -8,7 +8,7 @@ import gpis_native as gn
 import numpy as np
 import pytest
 from line_samplers import KERNELS, SERVED, factorises, worth
-from statistics_checks import check_proportion, check_z
+from statistics_checks import SIGNIFICANCE, check_proportion, check_z
 
 pytestmark = pytest.mark.stats
 every = pytest.mark.parametrize(("kernel", "sampler"), SERVED)
@@ -56,6 +56,37 @@ def test_mean_excursion(kernel, sampler, n, seed):
     # Longer ones than the line are rare, and not much longer.
     beyond = 5 * np.mean(t == 29)
     assert abs(t.mean() - pi / sqrt(KERNELS[kernel].derivative_variance(X))) < 5.33 * t.std() / sqrt(n) + beyond
+
+
+@pytest.mark.parametrize("slope", [1.5, 0.0, -1.5])
+@every
+def test_renewal_leaves_the_surface_with_the_flux_weighted_slope(kernel, sampler, slope, n, seed):
+    """Definitions B3: density ∝ v₊ N(v; m, s²) over a mean of slope m"""
+    n, s = worth(kernel, sampler, n), sqrt(KERNELS[kernel].derivative_variance(X))
+    gp = gn.GaussianProcess(gn.PlaneField([0, 0, 0], X, slope), 1, KERNELS[kernel], bounds=line(8))
+    state = {"value": np.zeros(n), "gradient": np.tile(X, (n, 1))}
+    t = 1e-4
+    v = gn.line_values(gp, *along_x(n), [t], start=state, memory="renewal", sampler=sampler, seed=seed)[:, 0] / t
+    v = np.sort(v[np.isfinite(v)])
+    assert len(v) > 0.99 * n
+    x = np.linspace(0, slope + 9 * s, 20_001)
+    mass = x * np.exp(-((x - slope) ** 2) / (2 * s * s))
+    cdf = np.interp(v, x, np.append(0, np.cumsum(0.5 * (mass[1:] + mass[:-1]))) / np.sum(0.5 * (mass[1:] + mass[:-1])))
+    steps = np.arange(len(v) + 1) / len(v)
+    distance = max(np.max(steps[1:] - cdf), np.max(cdf - steps[:-1]))
+    # Rays that meet the surface again within 1e-4 are missing, and rough paths bend on the way.
+    assert 2 * np.exp(-2 * len(v) * max(distance - 0.01, 0) ** 2) > SIGNIFICANCE, distance
+
+
+@pytest.mark.parametrize(("sampler", "h"), [("convolution", 1e-3), ("spectral", 1e-4), ("nystrom", 1e-4), ("dense", 1e-4)])
+def test_paths_are_smooth(sampler, h, seed):
+    """No jump and no kink where cells, blocks of nodes and halves of tables meet: second differences stay g''h², whose
+    deviation is √3. The window of the convolution lets nodes in at 1e-7."""
+    n = 12
+    gp = gn.GaussianProcess(5.0, 1, gn.SquaredExponential(1), bounds=line(8))
+    t = 2.0 + np.arange(0, 4, h)
+    g = gn.line_values(gp, *along_x(n), t, tolerance=1e-6, sampler=sampler, seed=seed)
+    assert np.nanmax(np.abs(np.diff(g, 2, axis=1))) < 12 * h * h
 
 
 @every
