@@ -36,7 +36,7 @@ def plan_by_owner(scene_name):
     owners = {}
     for key, sentence in (last(scene_name) or {"plan": {}})["plan"].items():
         owner, _, name = key.rpartition(": ")
-        owners.setdefault(owner or "Scene", {})[name] = str(sentence)
+        owners.setdefault(owner or "Scene", {})[name.removeprefix("scene.")] = str(sentence)
     return owners
 
 

@@ -154,6 +154,17 @@ def _draw_ring(context, xy):
         legend.text(context, said, xy[0] + 18 * scale, xy[1] - 26 * scale)
 
 
+def _put_away():
+    """Another tool in the views that hold this one: Blender would go on drawing its ring."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                with bpy.context.temp_override(window=window, area=area):
+                    tool = bpy.context.workspace.tools.from_space_view3d_mode("OBJECT", create=False)
+                    if tool is not None and tool.idname == GPISPaintTool.bl_idname:
+                        bpy.ops.wm.tool_set_by_id(name="builtin.select_box", space_type="VIEW_3D")
+
+
 _CLASSES = (GPIS_PT_brush, GPIS_PT_brush_overlay, GPIS_PT_brush_channel)
 
 
@@ -166,6 +177,7 @@ def register():
 
 def unregister():
     if not bpy.app.background:
+        _put_away()
         bpy.utils.unregister_tool(GPISPaintTool)
     for cls in reversed(_CLASSES):
         bpy.utils.unregister_class(cls)

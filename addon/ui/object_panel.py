@@ -88,7 +88,9 @@ class GPIS_PT_anisotropy(_VolumePanel, bpy.types.Panel):
 
     def content(self, layout, context):
         obj, settings = context.object, context.object.gpis
-        layout.row().prop(settings, "anisotropy", expand=True)
+        row = layout.row()
+        row.use_property_split = False
+        row.prop(settings, "anisotropy", expand=True)
         if settings.anisotropy == "AXES":
             column = layout.column()
             column.prop(settings, "ratios")

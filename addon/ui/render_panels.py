@@ -93,8 +93,8 @@ class GPIS_PT_statistics(_RenderPanel, bpy.types.Panel):
             if end["estimated_error"] is not None:
                 _row(column, "Error left", f"{100 * math.sqrt(end['estimated_error']):.2f} %")
         for name, value in entry["stats"].items():
-            if value:
-                _row(column, name.replace("_", " "), f"{value:,}" if isinstance(value, int) else str(value))
+            if value and not isinstance(value, (list, dict)):  # those are for the file
+                _row(column, name.replace("_", " "), _number(value))
         layout.operator("gpis.save_statistics", icon="EXPORT")
 
 
@@ -123,6 +123,12 @@ def _switched(layout, owner, switch, name, text):
     value = row.row()
     value.active = getattr(owner, switch)
     value.prop(owner, name, text="")
+
+
+def _number(value):
+    if isinstance(value, float):
+        return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
+    return f"{value:,}" if isinstance(value, int) else str(value)
 
 
 def _row(column, name, text):

@@ -27,3 +27,15 @@ def test_first_light(extension, tmp_path, monkeypatch):
     for figure in range(3):  # clay is red
         column = pixels[20:36, figure * third + 8 : (figure + 1) * third - 8]
         assert (column[..., 0] - column[..., 2]).max() > 0.15
+
+
+def test_preset_thumbnails(extension, tmp_path, monkeypatch):
+    """A ball of the preset's colour in the middle of the picture."""
+    options = ["--output", tmp_path, "--size", "24", "--samples", "4", "moss"]
+    monkeypatch.setattr(sys, "argv", ["preset_thumbnails.py", "--", *map(str, options)])
+    runpy.run_path(str(EXAMPLES / "preset_thumbnails.py"), run_name="__main__")
+    image = bpy.data.images.load(str(tmp_path / "moss.png"))
+    assert tuple(image.size) == (24, 24)
+    pixels = np.array(image.pixels[:]).reshape(24, 24, 4)
+    middle = pixels[9:15, 9:15, :3].mean(axis=(0, 1))
+    assert middle[1] > 1.3 * max(middle[0], middle[2]), "moss is green"
