@@ -237,6 +237,11 @@ class GPIS_PaintProperties(bpy.types.PropertyGroup):
     show_channel: BoolProperty(
         name="Channel", description="Colour the mean surface by what is painted, with a legend", default=True
     )
+    show_realisation: BoolProperty(
+        name="Realisation",
+        description="Show one of the random surfaces in place of the mean, sampled again after each stroke",
+        default=False,
+    )
     show_shells: BoolProperty(
         name="Shells at ±σ", description="Show the surfaces one standard deviation outside and inside", default=False
     )

@@ -103,7 +103,7 @@ class GPIS_PT_brush_overlay(bpy.types.Panel):
         layout = self.layout
         brush = context.scene.gpis.paint
         layout.label(text="While Painting")
-        for name in ("show_channel", "show_axes", "show_shells"):
+        for name in ("show_channel", "show_axes", "show_shells", "show_realisation"):
             layout.prop(brush, name)
 
 

@@ -67,8 +67,9 @@ def ratio(entries):
     return np.sqrt(squares[:, 2] / np.maximum(squares[:, 0], 1e-300))
 
 
-def axes(fields, vertices, normals, surface):
+def axes(fields, surface):
     """Ends (2 N, 3) of lines along the longest length scale, on a part of the vertices."""
+    vertices, normals = surface.vertices, surface.normals
     chosen = np.random.default_rng(0).permutation(len(vertices))[:_LINES]
     squares, vectors = np.linalg.eigh(matrices(fields.values("anisotropy", vertices[chosen])))
     length = float(np.linalg.norm(surface.high - surface.low)) / 60

@@ -22,7 +22,7 @@ void main()
 _FRAGMENT = """
 void main()
 {
-  float brightness = 0.65 + 0.35 * dot(normalize(shade_normal), light.xyz);
+  float brightness = 0.55 + 0.45 * dot(normalize(shade_normal), light.xyz);
   // The view's buffer takes linear numbers, colours are given as they are to be seen.
   frag_color = vec4(pow(base_color.rgb * brightness, vec3(2.2)), base_color.a * light.w);
 }

@@ -4,7 +4,8 @@ import bpy
 import numpy as np
 
 from ..paint import bake
-from . import channels, draw, legend, surface
+from . import channels, draw, legend, sampling, surface
+from .areas import tag_redraw
 
 GREY = (0.72, 0.72, 0.72)
 _SHELLS = ((1.0, (0.35, 0.65, 1.0)), (-1.0, (1.0, 0.55, 0.25)))
@@ -46,13 +47,6 @@ def painted():
         _drawn.pop(_live[0], None)
     _live = None
     tag_redraw()
-
-
-def tag_redraw():
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
 
 
 def tool_is_active(context):
@@ -102,6 +96,9 @@ def _refreshed(context, obj, found):
     active = obj == context.active_object and tool_is_active(context)
     live = _live is not None and _live[0] == obj.name
     settings = obj.gpis
+    sampled = sampling.of(context, obj) if active and brush.show_realisation and not live else None
+    if sampled is not None and sampled.vertices is None:
+        sampled = None  # not done yet: the mean, meanwhile
     key = (
         found.path,
         active and (brush.channel, brush.show_channel, brush.show_shells, brush.show_axes),
@@ -109,6 +106,7 @@ def _refreshed(context, obj, found):
         tuple(settings.ratios) + tuple(settings.rotation) + tuple(settings.infinite),
         len(settings.conditions),
         live and _step,
+        sampled and sampled.key,
     )
     drawn = _drawn.get(obj.name)
     if drawn is not None and drawn.key == key:
@@ -116,7 +114,8 @@ def _refreshed(context, obj, found):
     legend_before = drawn.legend if drawn is not None else None
     drawn = _drawn[obj.name] = _Drawn(key)
     fields = _live[1] if live else _fields(obj) if active else None
-    vertices, normals = found.vertices, found.normals
+    shape = sampled or found
+    vertices, normals = shape.vertices, shape.normals
     colours = np.broadcast_to(np.array(GREY), vertices.shape)
     if fields is not None:
         if live and brush.channel == "MEAN":
@@ -126,12 +125,12 @@ def _refreshed(context, obj, found):
             colours = colours if view.colours is None else view.colours
             drawn.legend = view.legend
         if brush.show_axes and brush.channel == "ANISOTROPY":
-            drawn.axes = channels.axes(fields, vertices, normals, found)
+            drawn.axes = channels.axes(fields, found)
         if brush.channel == "CONDITION":
             drawn.pins = channels.pins(settings.conditions, found)
         if brush.show_shells:
-            drawn.shells = _shells(fields, vertices, normals, found.triangles)
-    drawn.batch = draw.surface_batch(vertices, normals, found.triangles, colours)
+            drawn.shells = _shells(fields, found)
+    drawn.batch = draw.surface_batch(vertices, normals, shape.triangles, colours)
     return drawn
 
 
@@ -142,10 +141,10 @@ def _fields(obj):
         return None  # the tool's poll says why it cannot be painted on
 
 
-def _shells(fields, vertices, normals, triangles):
-    sigma = fields.values("deviation", vertices)[:, None]
+def _shells(fields, found):
+    way = fields.values("deviation", found.vertices)[:, None] * found.normals
     return [
-        draw.surface_batch(vertices + side * sigma * normals, normals, triangles, np.broadcast_to(tint, vertices.shape))
+        draw.surface_batch(found.vertices + side * way, found.normals, found.triangles, np.broadcast_to(tint, way.shape))
         for side, tint in _SHELLS
     ]
 
@@ -166,4 +165,5 @@ def unregister():
     _drawn.clear()
     _live = None
     surface.forget()
+    sampling.forget()
     draw.forget()

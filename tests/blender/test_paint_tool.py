@@ -136,7 +136,7 @@ def test_what_the_overlay_shows(module, sphere, brush):
     painting = bake.Painting(sphere, stroke.Brush(**brush.brush(sphere)))
     painting.add(stroke.Dabs([(0, 0, 1)], [0.6], [1.0], [(1, 0, 0)]))
     painting.finish()
-    lines = channels.axes(bake.fields(sphere), surface.vertices, surface.normals, surface).reshape(-1, 2, 3)
+    lines = channels.axes(bake.fields(sphere), surface).reshape(-1, 2, 3)
     assert len(lines) and np.all(lines[:, :, 2] > 0.7), "only where it is combed"
     along = np.abs((lines[:, 1] - lines[:, 0]) / np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1, keepdims=True))
     assert np.median(along[:, 0]) > 0.95
@@ -173,6 +173,23 @@ def test_realisation_as_a_mesh(sphere):
     points = np.array([vertex.co for vertex in made.data.vertices])
     radius = np.linalg.norm(points, axis=1)
     assert radius.mean() == pytest.approx(1, abs=0.05) and 0.01 < radius.std() < 0.1
+
+
+def test_the_realisation_of_the_overlay(module, sphere):
+    """Sampled once, again after a change, and then with the same noise."""
+    sampling = module("viewport.sampling")
+    first = sampling.of(bpy.context, sphere)
+    assert sampling.of(bpy.context, sphere) is first
+    first._thread.join()
+    assert first.done and 0.01 < np.linalg.norm(first.vertices, axis=1).std() < 0.1
+    assert np.median(np.sum(first.normals * first.vertices, axis=1)) > 0.7, "outwards"
+    sphere.gpis.sigma *= 0.1
+    second = sampling.of(bpy.context, sphere)
+    assert second is not first
+    second._thread.join()
+    bumps = [np.linalg.norm(entry.vertices, axis=1).std() for entry in (first, second)]
+    assert bumps[1] < 0.3 * bumps[0]
+    sampling.forget()
 
 
 def test_views_are_cameras(module):
