@@ -7,6 +7,7 @@ from math import erf, exp, pi, sqrt
 import gpis_native as gn
 import numpy as np
 import pytest
+from line_samplers import KERNELS, SERVED, worth
 from statistics_checks import check_proportion, check_same_distribution, check_z
 
 pytestmark = pytest.mark.stats
@@ -30,14 +31,16 @@ def rays(n, origin, direction):
     return np.tile(np.asarray(origin, float), (n, 1)), np.tile(direction, (n, 1))
 
 
-@pytest.mark.parametrize("kernel", [gn.SquaredExponential([1.0, 0.5, 2]), gn.Matern(2.5, 1.0), gn.Wong(1.0)])
-def test_crossing_rate_over_a_sloping_mean_and_deviation(kernel, n, seed):
+@pytest.mark.parametrize(
+    ("name", "sampler"), [p for p in SERVED if p[0] in ("squared exponential", "matern 5/2", "wong", "rational quadratic")]
+)
+def test_crossing_rate_over_a_sloping_mean_and_deviation(name, sampler, n, seed):
     """Oracle 2: down-rate (1/σ)φ(μ/σ)[sφ(m/s) - mΦ(-m/s)], m = d·∇μ - (μ/σ)d·∇σ, over a stretch too short for two."""
-    n, h = 4 * n, 0.02
+    n, h, kernel = worth(name, sampler, 4 * n), 0.02, KERNELS[name]
     mean = gn.PlaneField([0, 0, 0], [1, 0, 0], -0.8) + gn.ConstantField(0.3)
     sigma = (gn.PlaneField([0, 0, 0], [1, 0, 0], 0.7) + gn.ConstantField(0.5)).clamped(0, 2)
     gp = gn.GaussianProcess(mean, sigma, kernel, bounds=((-1, -1, -1), (1, 1, 1)))
-    hits = gn.first_hits(gp, *rays(n, [0, 0, 0], [1, 0, 0]), h, seed=seed)
+    hits = gn.first_hits(gp, *rays(n, [0, 0, 0], [1, 0, 0]), h, sampler=sampler, seed=seed)
     mu, s0 = 0.3 - 0.8 * h / 2, 0.5 + 0.7 * h / 2  # in the middle
     m, s = -0.8 - mu / s0 * 0.7, s0 * sqrt(kernel.derivative_variance([1, 0, 0]))
     rate = density(mu / s0) / s0 * (s * density(m / s) - m * normal_cdf(-m / s))
