@@ -68,6 +68,8 @@ VARYING = Leaf(
     anisotropy=along_x(lambda x: isotropic(0.3 * np.exp(x / 6)), 6),
 )
 RIPPLE = Leaf(gn.PlaneField([1.5, 0, 0], [1, 0, 0], 0.2), 0.4, gn.PlaneWave([5.0, 2.0, 1.0]))
+# Faces that a ray meets within one step: which one is first follows from all of them.
+FACES = [Leaf(gn.PlaneField([2, 0, 0], [-1, 0, 0], 1), s, length) for s, length in ((0.15, 1.0), (0.2, 1.1), (0.1, 0.9))]
 BOX = Leaf(gn.BoxField([1.7, 0, 0], [1.2, 2, 2]), 0.0, 1.0)
 
 TREES = {
@@ -86,6 +88,12 @@ TREES = {
         False,
     ),
     "varying lengths less a plane wave": (gn.difference(VARYING.process, RIPPLE.process), [VARYING, RIPPLE], False),
+    "faces in one place": (gn.union(*[x.process for x in FACES]), FACES, False),
+    "faces in one place, nested": (
+        gn.intersection(FACES[0].process, gn.union(FACES[1].process, FACES[2].process)),
+        FACES,
+        False,
+    ),
     "shared union": (gn.union(*[s.process for s in SAME], shared_noise=True), SAME, True),
     "shared difference": (gn.difference(*[s.process for s in SAME], shared_noise=True), SAME, True),
     "shared inside": (
