@@ -67,20 +67,28 @@ Vec3 vec_or_number(const py::handle& value, const std::string& name) {
                               py::repr(value).cast<std::string>() + ".");
 }
 
-std::vector<Vec3> points_argument(const py::handle& value, const std::string& name) {
+NumberArray rows_argument(const py::handle& value, const std::string& name) {
   const auto a = NumberArray::ensure(value);
   if (!a || a.ndim() != 2 || a.shape(1) != 3) {
     PyErr_Clear();
     throw std::invalid_argument(name + " must be an array of shape (N, 3).");
   }
-  std::vector<Vec3> points(a.shape(0));
-  const double* at = a.data();
-  for (py::ssize_t i = 0; i < a.shape(0); ++i, at += 3) {
-    points[i] = {at[0], at[1], at[2]};
-    if (!is_finite(points[i]))
-      throw std::invalid_argument(name + "[" + std::to_string(i) +
-                                  "] is not finite: every coordinate must be a number.");
-  }
+  return a;
+}
+
+Vec3 point_of(const NumberArray& rows, std::size_t i, const char* name) {
+  const double* at = rows.data() + 3 * i;
+  const Vec3 point{at[0], at[1], at[2]};
+  if (!is_finite(point))
+    throw std::invalid_argument(std::string(name) + "[" + std::to_string(i) +
+                                "] is not finite: every coordinate must be a number.");
+  return point;
+}
+
+std::vector<Vec3> points_argument(const py::handle& value, const char* name) {
+  const auto rows = rows_argument(value, name);
+  std::vector<Vec3> points(rows.shape(0));
+  for (std::size_t i = 0; i < points.size(); ++i) points[i] = point_of(rows, i, name);
   return points;
 }
 

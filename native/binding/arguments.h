@@ -47,8 +47,12 @@ void check_replaceable(const std::string& path, const std::string& name);
 // Three numbers, or one that stands for all three.
 Vec3 vec_or_number(const pybind11::handle& value, const std::string& name);
 
-// An array (N, 3) of finite numbers.
-std::vector<Vec3> points_argument(const pybind11::handle& value, const std::string& name);
+// An array (N, 3), and its row i: finite numbers.
+NumberArray rows_argument(const pybind11::handle& value, const std::string& name);
+Vec3 point_of(const NumberArray& rows, std::size_t i, const char* name);
+
+// All of them.
+std::vector<Vec3> points_argument(const pybind11::handle& value, const char* name);
 
 // An array of `count` numbers; `sentence` refuses anything else.
 NumberArray numbers_argument(const pybind11::handle& value, pybind11::ssize_t count,

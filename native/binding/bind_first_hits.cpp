@@ -32,7 +32,8 @@ py::dict first_hits_dict(const py::object& gp, const py::object& origins,
   const FirstHitsSetup setup = first_hits_setup({gp, origins, directions, memory, start, inside,
                                                  first_index, sampler, tolerance, seed, threads},
                                                 t_max);
-  return hits_dict(without_python([&] { return first_hits(setup.surface, setup.query); }), setup);
+  return hits_dict(without_python([&] { return first_hits(setup.surface, setup.query); }),
+                   setup.surface.leaves().size());
 }
 
 NumberArray line_values_array(const py::object& gp, const py::object& origins,

@@ -36,6 +36,15 @@ double tolerance_argument(double tolerance) {
   return tolerance;
 }
 
+// A vector as an array, which keeps it: large ones are not copied.
+template <class Number, class T>
+py::array_t<Number> array_of(std::vector<T> values, const std::vector<py::ssize_t>& shape) {
+  static_assert(sizeof(T) % sizeof(Number) == 0);
+  auto* kept = new std::vector<T>(std::move(values));
+  const py::capsule owner(kept, [](void* p) { delete static_cast<std::vector<T>*>(p); });
+  return py::array_t<Number>(shape, reinterpret_cast<const Number*>(kept->data()), owner);
+}
+
 // What rows have seen of their realisations, memory `global`: seed (N,), and where they were moved
 // outside, point (N, 3), value (N,), NaN where they were not; of a tree for each of its leaves.
 std::vector<RealisationMemory> realisations_argument(const py::handle& argument, std::size_t n,
@@ -205,18 +214,19 @@ void read_start(const py::object& start, std::size_t leaves, FirstHitsQuery& que
 }
 
 void read_rays(const py::object& origins, const py::object& directions, FirstHitsQuery& query) {
-  const auto o = points_argument(origins, "origins"), d = points_argument(directions, "directions");
-  if (o.size() != d.size())
+  const Array o = rows_argument(origins, "origins"), d = rows_argument(directions, "directions");
+  if (o.shape(0) != d.shape(0))
     throw std::invalid_argument("origins and directions must have as many rows, they have " +
-                                std::to_string(o.size()) + " and " + std::to_string(d.size()) +
+                                std::to_string(o.shape(0)) + " and " + std::to_string(d.shape(0)) +
                                 ".");
-  query.rays.reserve(o.size());
-  for (std::size_t i = 0; i < o.size(); ++i) {
-    if (std::abs(length(d[i]) - 1) > 1e-6)
+  query.rays.resize(o.shape(0));
+  for (std::size_t i = 0; i < query.rays.size(); ++i) {
+    const Vec3 origin = point_of(o, i, "origins"), direction = point_of(d, i, "directions");
+    if (std::abs(length(direction) - 1) > 1e-6)
       throw std::invalid_argument("directions[" + std::to_string(i) +
-                                  "] must have length 1, it has " + std::to_string(length(d[i])) +
-                                  ".");
-    query.rays.push_back({o[i], d[i]});
+                                  "] must have length 1, it has " +
+                                  std::to_string(length(direction)) + ".");
+    query.rays[i] = {origin, direction};
   }
 }
 
@@ -263,36 +273,22 @@ FirstHitsSetup first_hits_setup(const FirstHitsArguments& arguments, double t_ma
   return {std::move(surface), std::move(query)};
 }
 
-py::dict hits_dict(const FirstHits& hits, const FirstHitsSetup& setup) {
-  const py::ssize_t n = setup.query.rays.size();
-  const auto leaves = static_cast<py::ssize_t>(setup.surface.leaves().size());
-  std::vector<py::ssize_t> shape{n};
-  if (leaves > 1) shape.push_back(leaves);
-  Array t(n), position({n, py::ssize_t{3}}), gradient({n, py::ssize_t{3}}), value(shape);
-  shape.push_back(3);
-  Array slopes(shape);
-  py::array_t<std::int32_t> part(n);
-  std::copy(hits.t.begin(), hits.t.end(), t.mutable_data());
-  std::copy(hits.leaf.begin(), hits.leaf.end(), part.mutable_data());
-  const auto write = [](double* to, const Vec3& v) {
-    for (int k = 0; k < 3; ++k) to[k] = v[k];
-  };
-  double *p = position.mutable_data(), *g = gradient.mutable_data();
-  for (py::ssize_t i = 0; i < n; ++i, p += 3, g += 3) {
-    write(g, hits.gradient[i]);
-    write(p, hits.leaf[i] < 0 ? Vec3{kNan, kNan, kNan} : setup.query.rays[i].at(hits.t[i]));
-  }
-  double *v = value.mutable_data(), *s = slopes.mutable_data();
-  for (const State& state : hits.state) {
-    *v++ = state.value;
-    write(s, state.gradient);
-    s += 3;
-  }
-  py::dict state("value"_a = value, "gradient"_a = slopes);
-  if (!hits.realisation.empty()) state["realisation"] = realisations_dict(hits.realisation, leaves);
+py::dict hits_dict(FirstHits hits, std::size_t leaves) {
+  const auto n = static_cast<py::ssize_t>(hits.t.size());
+  std::vector<py::ssize_t> of_leaves{n};
+  if (leaves > 1) of_leaves.push_back(static_cast<py::ssize_t>(leaves));
+  auto slopes_of_leaves = of_leaves;
+  slopes_of_leaves.push_back(3);
+  py::dict state("value"_a = array_of<double>(std::move(hits.state_value), of_leaves),
+                 "gradient"_a = array_of<double>(std::move(hits.state_gradient), slopes_of_leaves));
+  if (!hits.realisation.empty())
+    state["realisation"] = realisations_dict(hits.realisation, static_cast<py::ssize_t>(leaves));
   if (!hits.segments.empty()) state["segments"] = segments_dict(hits.segments);
-  return py::dict("t"_a = t, "position"_a = position, "gradient"_a = gradient, "part"_a = part,
-                  "state"_a = state, "counters"_a = counters_dict(hits.counters));
+  return py::dict("t"_a = array_of<double>(std::move(hits.t), {n}),
+                  "position"_a = array_of<double>(std::move(hits.position), {n, 3}),
+                  "gradient"_a = array_of<double>(std::move(hits.gradient), {n, 3}),
+                  "part"_a = array_of<std::int32_t>(std::move(hits.leaf), {n}), "state"_a = state,
+                  "counters"_a = counters_dict(hits.counters));
 }
 
 }  // namespace gpis

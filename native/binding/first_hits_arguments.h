@@ -28,7 +28,7 @@ struct FirstHitsSetup {
 // Both, checked; rays end at t_max.
 FirstHitsSetup first_hits_setup(const FirstHitsArguments& arguments, double t_max);
 
-// What the function returns.
-pybind11::dict hits_dict(const FirstHits& hits, const FirstHitsSetup& setup);
+// What first_hits returns: arrays that hold the buffers of `hits`.
+pybind11::dict hits_dict(FirstHits hits, std::size_t leaves);
 
 }  // namespace gpis

@@ -71,12 +71,15 @@ Counters for_each_hit(const TreeSurface& surface, const FirstHitsQuery& query,
 
 FirstHits first_hits(const TreeSurface& surface, const FirstHitsQuery& query) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  constexpr Vec3 nowhere{nan, nan, nan};
   const std::size_t rays = query.rays.size(), leaves = surface.leaves().size();
   FirstHits result;
-  result.t.resize(rays);
-  result.leaf.resize(rays);
-  result.gradient.assign(rays, {nan, nan, nan});
-  result.state.assign(rays * leaves, {nan, {nan, nan, nan}});
+  result.t.assign(rays, kInfinity);
+  result.leaf.assign(rays, -1);
+  result.position.assign(rays, nowhere);
+  result.gradient.assign(rays, nowhere);
+  result.state_value.assign(rays * leaves, nan);
+  result.state_gradient.assign(rays * leaves, nowhere);
   result.realisation = query.realisation;
   if (surface.memory() == Memory::global) result.realisation.resize(rays * leaves);
   if (surface.memory() == Memory::segments) {
@@ -87,9 +90,10 @@ FirstHits first_hits(const TreeSurface& surface, const FirstHitsQuery& query) {
       for_each_hit(surface, query, result.realisation,
                    [&](std::size_t i, std::vector<Line>& lines, const TreeHit& hit, Rng& rng,
                        Counters& counters) {
+                     if (hit.leaf < 0) return;
                      result.t[i] = hit.t;
                      result.leaf[i] = hit.leaf;
-                     if (hit.leaf < 0) return;
+                     result.position[i] = query.rays[i].at(hit.t);
                      for (std::size_t k = 0; k < leaves; ++k) {
                        const ProcessSurface& leaf = surface.leaves()[k];
                        if (!leaf.sampled_at(lines[k], hit.t)) continue;
@@ -97,11 +101,13 @@ FirstHits first_hits(const TreeSurface& surface, const FirstHitsQuery& query) {
                        const double value = winner ? 0 : leaf.value(lines[k], hit.t, rng);
                        counters.line_normals += 2;
                        const Vec3 gradient = leaf.gradient_law(lines[k], hit.t, rng).draw(rng);
-                       State& state = result.state[i * leaves + k] = leaf.state(value, gradient);
+                       const State state = leaf.state(value, gradient);
+                       result.state_value[i * leaves + k] = state.value;
+                       result.state_gradient[i * leaves + k] = state.gradient;
                        if (!result.segments.empty()) {
                          SegmentMemory& kept = result.segments[i * leaves + k];
                          leaf.keep_segment(lines[k], hit.t, kept);
-                         leaf.keep_end(query.rays[i].at(hit.t), state, kept);
+                         leaf.keep_end(result.position[i], state, kept);
                        }
                        if (winner) result.gradient[i] = gradient * surface.sign(hit.leaf);
                      }

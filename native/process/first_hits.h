@@ -30,11 +30,14 @@ struct FirstHitsQuery {
 };
 
 struct FirstHits {
-  std::vector<double> t;       // infinity where there is none
-  std::vector<int> leaf;       // that was hit, -1 where there is no hit
-  std::vector<Vec3> gradient;  // of the tree, drawn from its law; NaN where there is no hit
-  // One a ray and leaf: value 0 at the leaf that was hit, NaN where the leaf was not sampled.
-  std::vector<State> state;
+  std::vector<double> t;           // infinity where there is none
+  std::vector<std::int32_t> leaf;  // that was hit, -1 where there is no hit
+  // Of the hit and, drawn from its law, of the tree; NaN where there is no hit.
+  std::vector<Vec3> position, gradient;
+  // The states to remember, one a ray and leaf: value 0 at the leaf that was hit, NaN where the
+  // leaf was not sampled.
+  std::vector<double> state_value;
+  std::vector<Vec3> state_gradient;
   std::vector<RealisationMemory> realisation;  // that each has seen; memory `global` alone
   std::vector<SegmentMemory> segments;         // and what it kept; memory `segments` alone
   Counters counters;
