@@ -2,15 +2,18 @@
 // neither on threads nor on tiles.
 #pragma once
 
-#include <boost/random/normal_distribution.hpp>
 #include <cstddef>
 #include <cstdint>
 
+#include "core/ziggurat.h"
+
 namespace gpis {
 
-// SplitMix64 finaliser (Steele, Lea, Flood 2014): the hash behind every seed.
+inline constexpr std::uint64_t kGolden = 0x9e3779b97f4a7c15ull;
+
+// SplitMix64 (Steele, Lea, Flood 2014), one step: the hash behind every seed.
 inline std::uint64_t mix64(std::uint64_t z) {
-  z += 0x9e3779b97f4a7c15ull;
+  z += kGolden;
   z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
   z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
   return z ^ (z >> 31);
@@ -23,7 +26,10 @@ class Rng {
 
   Rng(std::uint64_t seed, std::uint64_t stream, std::uint64_t substream = 0) {
     std::uint64_t h = mix64(mix64(mix64(seed) ^ stream) ^ substream);
-    for (auto& s : state_) s = h = mix64(h);
+    for (auto& s : state_) {
+      s = mix64(h);
+      h += kGolden;
+    }
   }
 
   static constexpr result_type min() { return 0; }
@@ -44,10 +50,10 @@ class Rng {
   double uniform() { return static_cast<double>((*this)() >> 11) * 0x1p-53; }
   // Uniform in (0, 1]: safe under a logarithm.
   double positive_uniform() { return static_cast<double>(((*this)() >> 11) + 1) * 0x1p-53; }
-  // Standard normal (Boost's ziggurat). The distribution keeps no state between calls.
-  double normal() { return boost::random::normal_distribution<double>()(*this); }
+  // Standard normal.
+  double normal() { return Ziggurat::draw(*this); }
   // As many in a row: the state stays in registers.
-  [[gnu::flatten]] void normals(double* out, std::size_t count) {
+  void normals(double* out, std::size_t count) {
     Rng local = *this;
     for (std::size_t i = 0; i < count; ++i) out[i] = local.normal();
     *this = local;
