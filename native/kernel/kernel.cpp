@@ -5,7 +5,8 @@
 namespace gpis {
 
 double Term::covariance(const Vec3& r) const {
-  return weight * radial.value(distance(r)) * std::cos(dot(wave_vector, r));
+  const double k = weight * radial.value(distance(r));
+  return modulated() ? k * std::cos(dot(wave_vector, r)) : k;
 }
 
 double Term::max_inverse_length() const {

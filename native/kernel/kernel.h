@@ -18,7 +18,7 @@ struct Term {
   Mat3 whitening;    // B, A⁻¹ = BᵀB; rows orthogonal, a zero row = constant along that axis
   Vec3 wave_vector;  // k, 0 = none
 
-  bool modulated() const { return length(wave_vector) > 0; }
+  bool modulated() const { return wave_vector.x != 0 || wave_vector.y != 0 || wave_vector.z != 0; }
   // q = |B r|, below the square root of the largest double.
   double distance(const Vec3& r) const { return std::min(length(whitening * r), 1e150); }
   double covariance(const Vec3& r) const;
@@ -35,6 +35,11 @@ class Kernel {
   virtual double covariance(const Vec3& r) const = 0;
   // ∂/∂x_i k(x - y) and ∂²/∂x_i∂y_j k(x - y), the latter minus the Hessian of k(r).
   virtual Vec3 gradient(const Vec3& r) const = 0;
+  // Both together.
+  virtual double covariance_and_gradient(const Vec3& r, Vec3& slopes) const {
+    slopes = gradient(r);
+    return covariance(r);
+  }
   virtual Mat3 mixed(const Vec3& r) const = 0;
   // False with a Matérn 1/2 inside: g has no gradient, `mixed` is infinite at 0.
   virtual bool differentiable() const = 0;

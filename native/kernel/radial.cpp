@@ -63,6 +63,17 @@ double Radial::slope_over_q(double q) const {
   return 0;
 }
 
+double Radial::value_and_slope_over_q(double q, double& slope) const {
+  const double k = value(q);
+  if (family == Family::squared_exponential)
+    slope = -k;
+  else if (family == Family::rational_quadratic)
+    slope = -k / (1 + q * q / (2 * alpha));
+  else
+    slope = slope_over_q(q);
+  return k;
+}
+
 double Radial::curvature(double q) const {
   return family == Family::matern12 ? std::exp(-q) : slope_over_q(q) + excess(q);
 }

@@ -22,8 +22,10 @@ struct Radial {
   double value(double q) const;
   double slope(double q) const;         // κ'
   double slope_over_q(double q) const;  // κ'/q, -λ₂ at 0
-  double curvature(double q) const;     // κ''
-  double excess(double q) const;        // κ'' - κ'/q, 0 at 0 where differentiable
+  // κ and κ'/q together, for little more than one of them.
+  double value_and_slope_over_q(double q, double& slope_over_q) const;
+  double curvature(double q) const;  // κ''
+  double excess(double q) const;     // κ'' - κ'/q, 0 at 0 where differentiable
 
   // ψ(Q) = κ(√Q) (formulas C10): ψ' = κ'/(2q) and ψ'' = (κ'' - κ'/q)/(4q²). ψ'' grows as 1/q at 0
   // for Matérn 3/2 and Wong, whose third derivative jumps there: only its product with something

@@ -28,6 +28,15 @@ Vec3 StationaryKernel::gradient(const Vec3& r) const {
   return transpose(b) * (b * r) * (term_.radial.slope(q) / q);
 }
 
+double StationaryKernel::covariance_and_gradient(const Vec3& r, Vec3& slopes) const {
+  const Mat3& b = term_.whitening;
+  const double q = term_.distance(r);
+  double slope_over_q = 0;
+  const double k = term_.radial.value_and_slope_over_q(q, slope_over_q);
+  slopes = q == 0 ? Vec3{} : transpose(b) * (b * r) * slope_over_q;
+  return term_.weight * k;
+}
+
 Mat3 StationaryKernel::mixed(const Vec3& r) const {
   const Mat3& b = term_.whitening;
   const double q = term_.distance(r);

@@ -11,6 +11,7 @@ class StationaryKernel : public Kernel {
  public:
   double covariance(const Vec3& r) const override { return term_.covariance(r); }
   Vec3 gradient(const Vec3& r) const override;
+  double covariance_and_gradient(const Vec3& r, Vec3& slopes) const override;
   Mat3 mixed(const Vec3& r) const override;
   bool differentiable() const override { return term_.radial.differentiable(); }
   double min_length_scale() const override { return scales_.shortest(); }

@@ -91,9 +91,13 @@ Covariance::Profile Covariance::profile(double Q) const {
   Profile sum{0, 0, 0};
   for (const Scale& s : scales_) {
     const double q2 = Q * s.inverse_length2, q = std::sqrt(q2);
-    sum.psi += s.weight * s.radial.value(q);
-    if constexpr (derivatives > 0)
-      sum.psi1 += s.weight * s.inverse_length2 * 0.5 * s.radial.slope_over_q(q);
+    if constexpr (derivatives == 0) {
+      sum.psi += s.weight * s.radial.value(q);
+    } else {
+      double slope_over_q;
+      sum.psi += s.weight * s.radial.value_and_slope_over_q(q, slope_over_q);
+      sum.psi1 += s.weight * s.inverse_length2 * 0.5 * slope_over_q;
+    }
     // Matérn 3/2 and Wong: ψ'' ~ 1/q at 0, where what multiplies it is of order q².
     if constexpr (derivatives > 1)
       if (q2 > 1e-200)
@@ -130,9 +134,10 @@ double Covariance::along(const LocalPoint& x, const Vec3& d, const SymMat3& da, 
     return c[0];
   }
   if (!anisotropy_) {
-    const Vec3 r = x.x - y.x;
-    slope = of_y.value * dot(d, kernel_->gradient(r));
-    return of_y.value * kernel_->covariance(r);
+    Vec3 slopes;
+    const double k = kernel_->covariance_and_gradient(x.x - y.x, slopes);
+    slope = of_y.value * dot(d, slopes);
+    return of_y.value * k;
   }
   const Pair pair(x, y);
   const Profile f = profile<1>(pair.Q);
@@ -145,9 +150,10 @@ double Covariance::along(const LocalPoint& x, const Vec3& d, const SymMat3& da, 
 Eigen::Matrix4d Covariance::block(const LocalPoint& x, const LocalPoint& y) const {
   Eigen::Matrix4d b;
   if (!anisotropy_) {
-    const Vec3 r = x.x - y.x, g = kernel_->gradient(r);
+    const Vec3 r = x.x - y.x;
+    Vec3 g;
+    b(0, 0) = kernel_->covariance_and_gradient(r, g);
     const Mat3 m = kernel_->mixed(r);
-    b(0, 0) = kernel_->covariance(r);
     for (int i = 0; i < 3; ++i) {
       b(1 + i, 0) = g[i];
       b(0, 1 + i) = -g[i];
@@ -199,8 +205,9 @@ Eigen::Vector4d Covariance::cross(const LocalPoint& x, const LocalPoint& y,
   }
   Eigen::Vector4d c;
   if (!anisotropy_) {
-    const Vec3 r = x.x - y.x;
-    c << kernel_->covariance(r), to_eigen(kernel_->gradient(r));
+    Vec3 slopes;
+    const double k = kernel_->covariance_and_gradient(x.x - y.x, slopes);
+    c << k, to_eigen(slopes);
     return c * of_y.value;
   }
   const Pair pair(x, y);
@@ -217,8 +224,8 @@ double Covariance::between(const LocalPoint& x, const Functional& of_x, const Lo
                            const Functional& of_y) const {
   if (of_x.value_only()) {
     if (of_y.value_only()) return of_x.value * of_y.value * value(x, y);
-    return of_x.value * cross(y, x, {of_y.value, {}})[0] +
-           of_x.value * dot(of_y.slope, to_vec(cross(y, x, {}).tail<3>()));
+    const Eigen::Vector4d c = cross(y, x, of_x);
+    return of_y.value * c[0] + dot(of_y.slope, to_vec(c.tail<3>()));
   }
   const Eigen::Vector4d c = cross(x, y, of_y);
   return of_x.value * c[0] + dot(of_x.slope, to_vec(c.tail<3>()));
