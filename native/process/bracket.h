@@ -14,7 +14,7 @@ Verdict classify(const P& a, const P& b, double margin) {
   // Inside (after a skip, or a certain start), or where mean and σ are both 0: wait until the path
   // is out.
   if (a.f < 0 || (a.f == 0 && !(a.df > 0))) return Verdict::none;
-  const double h = b.t - a.t, c1 = a.f + h * a.df / 3, c2 = b.f - h * b.df / 3;
+  const double h = b.t - a.t, c1 = a.f + h / 3 * a.df, c2 = b.f - h / 3 * b.df;
   if (b.f > 0) return c1 > margin && c2 > margin ? Verdict::none : Verdict::unclear;
   return c1 < margin && c2 > -margin ? Verdict::unclear
                                      : Verdict::single;  // Descartes' rule of signs
@@ -24,7 +24,7 @@ Verdict classify(const P& a, const P& b, double margin) {
 template <class P>
 double cubic_root(const P& lo, const P& hi) {
   const double h = hi.t - lo.t;
-  const double c0 = lo.f, c1 = c0 + h * lo.df / 3, c3 = hi.f, c2 = c3 - h * hi.df / 3;
+  const double c0 = lo.f, c1 = c0 + h / 3 * lo.df, c3 = hi.f, c2 = c3 - h / 3 * hi.df;
   double a = 0, b = 1, s = c0 > 0 ? c0 / (c0 - c3) : 0.5;
   for (int i = 0; i < 8; ++i) {
     const double r = 1 - s;

@@ -30,7 +30,7 @@ class ConvolutionPath {
     const double h2 = line_.inverse_length() * line_.inverse_length();
     deviation_ = kDeviation * h2 * h2;
     conditioned_ = false;
-    nodes_.clear();
+    drawn_ = 0;
     runs_.clear();
   }
 
@@ -71,24 +71,24 @@ class ConvolutionPath {
   // kernel starts a new run.
   void prepare(long cell, Rng& rng, Counters& counters) {
     const long first = cell - 7, last = cell + 8;
-    if (runs_.empty() || first > end(runs_.back())) runs_.push_back({first, nodes_.size()});
+    if (runs_.empty() || first > end(runs_.back())) runs_.push_back({first, drawn_});
     const long missing = last + 1 - end(runs_.back());
     if (missing <= 0) return;
     counters.line_normals += missing;
-    const std::size_t drawn = nodes_.size();
-    nodes_.resize(drawn + missing);
-    rng.normals(nodes_.data() + drawn, missing);
+    if (drawn_ + missing > nodes_.size()) nodes_.resize(2 * (drawn_ + missing));
+    rng.normals(nodes_.data() + drawn_, missing);
+    drawn_ += missing;
   }
 
   // At the ends of a cell, q = kh and (k+1)h: fixed weights. The node at distance 4 is left out on
   // both sides, so that neighbouring cells agree to the last bit.
   void at_left(long cell, double& g, double& dg) const {
     ends(cell, kTable.left, g, dg);
-    condition(cell * kStep, g, dg);
+    condition_end(cell, g, dg);
   }
   void at_right(long cell, double& g, double& dg) const {
     ends(cell, kTable.right, g, dg);
-    condition((cell + 1) * kStep, g, dg);
+    condition_end(cell + 1, g, dg);
   }
 
   // Anywhere in [kh, (k+1)h], by ONE node set for the whole cell (definitions E5). The weights
@@ -97,10 +97,12 @@ class ConvolutionPath {
     const double q = line_.q(t), x = q - cell * kStep;
     if (conditioned_ && q < kNear) return at_near(q, g, dg);
     const double up = std::exp(2 * kStep * x), down = 1 / up;
-    double power[kNodes];
+    double power[kNodes];  // by twos, so that products need not wait for each other
     power[7] = std::exp(-x * x);
-    for (int i = 8; i < kNodes; ++i) power[i] = power[i - 1] * up;
-    for (int i = 6; i >= 0; --i) power[i] = power[i + 1] * down;
+    power[8] = power[7] * up;
+    power[6] = power[7] * down;
+    for (int i = 9; i < kNodes; ++i) power[i] = power[i - 2] * (up * up);
+    for (int i = 5; i >= 0; --i) power[i] = power[i + 2] * (down * down);
     const Eigen::Array<double, kNodes, 1> w =
         Eigen::Map<const Eigen::Array<double, kNodes, 1>>(power) * kTable.gauss *
         window(cell).array();
@@ -123,6 +125,9 @@ class ConvolutionPath {
   // Where the expansion about a known start serves, to rounding.
   static constexpr double kNear = 0.03;
   static constexpr int kTerms = 7;
+  // exp(-q²/2) < 3e-18 beyond.
+  static constexpr double kReach = 9;
+  static constexpr int kEnds = 19;  // of cells within reach
 
   struct Run {
     long first;
@@ -137,8 +142,10 @@ class ConvolutionPath {
   struct Table {
     Eigen::Array<double, kNodes, 1> node, gauss;
     End left, right;
+    std::array<double, kEnds> decay;  // exp(-q²/2) at the ends of cells
 
     Table() {
+      for (int i = 0; i < kEnds; ++i) decay[i] = std::exp(-0.5 * (i * kStep) * (i * kStep));
       const double scale = std::pow(2 / kPi, 0.25) * std::sqrt(kStep);
       for (int i = 0; i < kNodes; ++i) {
         node[i] = (i - 7) * kStep;
@@ -155,9 +162,7 @@ class ConvolutionPath {
   inline static const Table kTable;
 
   // One past the last node drawn, as the run that is still growing knows it.
-  long end(const Run& run) const {
-    return run.first + static_cast<long>(nodes_.size() - run.offset);
-  }
+  long end(const Run& run) const { return run.first + static_cast<long>(drawn_ - run.offset); }
 
   void ends(long cell, const End& weights, double& g, double& dg) const {
     const Window xi = window(cell);
@@ -199,12 +204,17 @@ class ConvolutionPath {
 
   // From here on derivatives are per t.
   void condition(double q, double& g, double& dg) const {
-    if (conditioned_ && q <= 9) {  // exp(-q²/2) < 3e-18 beyond
-      const double k = std::exp(-0.5 * q * q), x = delta_value_ + q * delta_slope_;
-      g += k * x;
-      dg += k * (delta_slope_ - q * x);
-    }
+    if (conditioned_ && q <= kReach) add_start(q, std::exp(-0.5 * q * q), g, dg);
     dg *= line_.inverse_length();
+  }
+  void condition_end(long end, double& g, double& dg) const {
+    if (conditioned_ && end < kEnds) add_start(end * kStep, kTable.decay[end], g, dg);
+    dg *= line_.inverse_length();
+  }
+  void add_start(double q, double k, double& g, double& dg) const {
+    const double x = delta_value_ + q * delta_slope_;
+    g += k * x;
+    dg += k * (delta_slope_ - q * x);
   }
 
   Window window(long cell) const {
@@ -221,7 +231,8 @@ class ConvolutionPath {
   double value_ = 0, slope_ = 0;  // of a known start, per length scale
   std::array<double, kTerms> moments_{};
   bool expanded_ = false;
-  std::vector<double> nodes_;
+  std::vector<double> nodes_;  // room for more than are drawn
+  std::size_t drawn_ = 0;
   std::vector<Run> runs_;
 };
 static_assert(LinePath<ConvolutionPath>);

@@ -27,10 +27,11 @@ PathGradient RadialLine::gradient(double t, double slope) const {
   PathGradient law;
   law.free_variance = (1 - c) * (1 + c);
   const double spread = std::sqrt(plan_->lambda2 * law.free_variance);
+  const Frame e = frame();
   law.mean =
-      plan_->gradient_of * (e1_ * (c * gamma1_) + e2_ * (c * gamma2_) + ed_ * per_length(slope));
-  law.b1 = plan_->gradient_of * (e1_ * spread);
-  law.b2 = plan_->gradient_of * (e2_ * spread);
+      plan_->gradient_of * (e.s * (c * gamma1_) + e.t * (c * gamma2_) + e.n * per_length(slope));
+  law.b1 = plan_->gradient_of * (e.s * spread);
+  law.b2 = plan_->gradient_of * (e.t * spread);
   return law;
 }
 

@@ -24,12 +24,8 @@ class RadialLine {
     plan_ = &plan;
     anchor_ = anchor;
     remembered_ = false;
-    const Vec3 whitened = plan.whitening * line.direction;
-    inverse_length_ = length(whitened);
-    const Frame frame(inverse_length_ > 0 ? whitened / inverse_length_ : plan.constant);
-    e1_ = frame.s;
-    e2_ = frame.t;
-    ed_ = frame.n;
+    whitened_ = plan.whitening * line.direction;
+    inverse_length_ = length(whitened_);
   }
 
   // 1/ℓ_d per t; 0 where g is constant along the line.
@@ -45,18 +41,24 @@ class RadialLine {
   // The gradient at the anchor is known: slopes across the line start from it.
   void remember(const Vec3& gradient) {
     const Vec3 slopes = plan_->slopes_of * gradient;
-    gamma1_ = dot(e1_, slopes);
-    gamma2_ = dot(e2_, slopes);
+    const Frame e = frame();
+    gamma1_ = dot(e.s, slopes);
+    gamma2_ = dot(e.t, slopes);
     remembered_ = true;
   }
 
-  // ∇g = Bᵀ(γ₁e₁ + γ₂e₂ + g'e_d); γ(q) = cγ(0) + √(λ₂(1-c²)) ξ.
+  // ∇g = Bᵀ(γ₁s + γ₂t + g'n); γ(q) = cγ(0) + √(λ₂(1-c²)) ξ.
   PathGradient gradient(double t, double slope) const;
 
  private:
   const Plan* plan_ = nullptr;
+  // Orthonormal in whitened space, n along the line; most lines end without needing it.
+  Frame frame() const {
+    return Frame(inverse_length_ > 0 ? whitened_ / inverse_length_ : plan_->constant);
+  }
+
+  Vec3 whitened_;  // the direction
   double inverse_length_ = 1, anchor_ = 0;
-  Vec3 e1_, e2_, ed_;  // orthonormal in whitened space, e_d along the line
   double gamma1_ = 0, gamma2_ = 0;
   bool remembered_ = false;
 };

@@ -87,9 +87,15 @@ double ProcessSurface::first_hit(Line& line, const Ray& ray, double t_max, const
   if (memory_ == Memory::global) l.path<RealisationPath>().keep(start.realisation, start.inside);
   JointLine* joint = memory_ == Memory::segments ? l.plan->line_sampler->joint(l) : nullptr;
   if (joint) joint->recall(start.segments, start.inside ? -1 : 1);
-  Start seen = start;
-  if (start.inside) seen.state = {-start.state.value, -start.state.gradient};
-  const double t = l.plan->line_sampler->first_hit(*l.plan, l, t_begin, t_end, seen, rng, counters);
+  Start turned;
+  const Start* seen = &start;
+  if (start.inside) {
+    turned = start;
+    turned.state = {-start.state.value, -start.state.gradient};
+    seen = &turned;
+  }
+  const double t =
+      l.plan->line_sampler->first_hit(*l.plan, l, t_begin, t_end, *seen, rng, counters);
   if (memory_ == Memory::global) l.path<RealisationPath>().keep(nullptr, false);
   if (joint) joint->recall(nullptr, start.inside ? -1 : 1);
   return t;
