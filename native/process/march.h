@@ -59,7 +59,9 @@ class March {
     cell_ = 0;
     double b = step_end(a, t_end);
     enter(a, b);
-    Point from = begin(a, start);
+    // Steps hand on their end by name: copies would wait for what was just written.
+    Point points[2] = {begin(a, start), {}};
+    Point *from = &points[0], *to = &points[1];
     path_.prepare(0, rng_, counters_);
     line_.stretches.push_back({a, a, 0});
 
@@ -69,28 +71,27 @@ class March {
       b = step_end(a, t_end);
       last_cell_ = cell_;
       const double whole = std::min(cell_end(), t_end);
-      Point to;
       if (kBreaks && piece_end_ < whole && tried_cell_ != cell_ &&
-          certainly_clear(from, whole, to)) {
+          certainly_clear(*from, whole, *to)) {
         b = whole;
         new_piece = true;
       } else {
-        if (Path::kStride > 1 && b == cell_end()) b = stride_end(from, b, t_end);
+        if (Path::kStride > 1 && b == cell_end()) b = stride_end(*from, b, t_end);
         enter(a, b);
-        if (new_piece) from = combine(a, from.g, from.dg);  // same path, fields of the new piece
-        to = evaluate_end(b);
-        const Verdict verdict = classify_step(from, to);
-        if (verdict != Verdict::none && find_root(from, to, verdict)) return line_.hit_t;
+        if (new_piece) *from = combine(a, from->g, from->dg);  // same path, fields of the new piece
+        *to = evaluate_end(b);
+        const Verdict verdict = classify_step(*from, *to);
+        if (verdict != Verdict::none && find_root(*from, *to, verdict)) return line_.hit_t;
         new_piece = kBreaks && b == piece_end_;
       }
       line_.stretches.back().end = b;
       line_.stretches.back().last_cell = last_cell_;
       if (b >= t_end) return kInfinity;
 
-      from = to;
+      std::swap(from, to);
       a = b;
       if (b == cell_end(last_cell_)) cell_ = last_cell_ + 1;
-      if (to.mean > threshold_at(a)) {
+      if (from->mean > threshold_at(a)) {
         const double clear = mean_.above_until(a, t_end, threshold_at(a));
         if (clear >= t_end) return kInfinity;
         if (clear - a > step_) {
@@ -99,9 +100,9 @@ class March {
           last_cell_ = cell_;
           path_.prepare(cell_, rng_, counters_);
           enter(a, step_end(a, t_end));
-          from = evaluate(a);
+          *from = evaluate(a);
           new_piece = false;
-          if (!(from.f > 0)) ++counters_.line_entry_inside;
+          if (!(from->f > 0)) ++counters_.line_entry_inside;
           line_.stretches.push_back({a, a, cell_});
           continue;
         }
@@ -141,7 +142,7 @@ class March {
   double stride_end(const Point& from, double b, double t_end) {
     const double far = cell_end(cell_ + 1), h = far - from.t;
     if (!(far <= std::min({from.t + smooth_step_, t_end, piece_end_}))) return b;
-    if (!(from.f > path_.deviation(h) * from.sigma && from.f + h * from.df / 3 > 0)) return b;
+    if (!(from.f > path_.deviation(h) * from.sigma && from.f + h / 3 * from.df > 0)) return b;
     last_cell_ = cell_ + 1;
     path_.prepare(last_cell_, rng_, counters_);
     return far;
@@ -206,7 +207,7 @@ class March {
     to = evaluate_end(whole);
     const double h = whole - from.t;
     const double mean = 0.5 * (from.mean + to.mean - mean_slope_ * h);
-    const double g = std::min({from.g, to.g, from.g + h * from.dg / 3, to.g - h * to.dg / 3}) -
+    const double g = std::min({from.g, to.g, from.g + h / 3 * from.dg, to.g - h / 3 * to.dg}) -
                      path_.deviation(h);
     const double middle = 0.5 * (from.sigma + to.sigma), spread = 0.5 * sigma_slope_ * h;
     const double sigma = g < 0 ? middle + spread : std::max(0.0, middle - spread);
