@@ -26,8 +26,10 @@ def add(sync, obj, matrix_world):
     names = materials.of_object(sync, obj)
     if len(names) > 1:
         sync.warn(f"{owner} has {len(names)} material slots: the first is its micro-BRDF, the others are not used.")
+    entry = {} if not obj.gpis.use_albedo else {"albedo": _albedo(owner, obj)}
     sync.description["objects"].append(
-        {
+        entry
+        | {
             "name": obj.name,
             "type": "gpis",
             "process": process,
@@ -100,6 +102,19 @@ def _anisotropy(owner, settings, path):
             f"{' and no '.join(missing)}: paint it, or choose Uniform or Axes (Object properties, GPIS, Anisotropy)."
         )
     return native().VdbTensorField(path)
+
+
+def _albedo(owner, obj):
+    path = volume.path_of(obj.data)
+    if "albedo" not in volume.vector_grid_names(path):
+        raise SyncError(
+            f'{owner}: its albedo is to come from a grid, but "{path}" holds no albedo: paint it, or switch Albedo Grid off '
+            "(Object properties, GPIS)."
+        )
+    try:
+        return native().VdbColorField(path, "albedo")
+    except (ValueError, OSError) as error:
+        raise SyncError(f"{owner}: {error}") from error
 
 
 def _grid(owner, what, name, grids, path):

@@ -6,6 +6,7 @@
 
 #include "binding/arguments.h"
 #include "binding/bindings.h"
+#include "binding/color_field_argument.h"
 #include "field/check.h"
 #include "field/painted_fields.h"
 
@@ -72,8 +73,23 @@ py::dict counts_dict(const PaintCounts& c) {
                   "undirected"_a = c.undirected, "rejected"_a = c.rejected);
 }
 
+// ℓ, or the entries xx,yy,zz,xy,xz,yz of A.
+SymMat3 squared_lengths(const py::object& length_scale) {
+  const auto a = NumberArray::ensure(length_scale);
+  PyErr_Clear();
+  if (a && a.ndim() == 1 && a.size() == 6) {
+    SymMat3 tensor;
+    for (int i = 0; i < 6; ++i) tensor[i] = a.at(i);
+    return tensor;
+  }
+  if (!a || a.ndim() != 0)
+    refuse("length_scale takes a number, or the six entries xx,yy,zz,xy,xz,yz of A.");
+  check_positive("length_scale", *a.data());
+  return SymMat3::identity(*a.data() * *a.data());
+}
+
 std::unique_ptr<PaintedFields> open(const py::object& path, const std::string& mean, double sigma,
-                                    double length_scale, const std::string& sigma_grid,
+                                    const py::object& length_scale, const std::string& sigma_grid,
                                     const std::string& sigma_meaning, double sigma_factor,
                                     bool anisotropy, bool albedo) {
   if (sigma_meaning != "value" && sigma_meaning != "variance")
@@ -81,7 +97,7 @@ std::unique_ptr<PaintedFields> open(const py::object& path, const std::string& m
   const PaintSource source{path_argument(path, "path"),
                            mean,
                            sigma,
-                           length_scale,
+                           squared_lengths(length_scale),
                            sigma_grid,
                            sigma_meaning == "variance" ? GridMeaning::variance : GridMeaning::value,
                            sigma_factor,
@@ -147,7 +163,45 @@ Box3 bounds_argument(const py::object& bounds) {
 
 }  // namespace
 
+ColorFieldPtr color_field_argument(const py::handle& value, const std::string& name) {
+  return instance_argument<ColorField>(value, name, "a ColorField");
+}
+
 void bind_paint(py::module_& m) {
+  py::class_<ColorField, std::shared_ptr<ColorField>>(
+      m, "ColorField",
+      R"(A colour over space, linear RGB: 'albedo' of a GPIS object in a scene multiplies the colours of its materials.)")
+      .def(
+          py::init([](const py::object& red, const py::object& green, const py::object& blue) {
+            return std::make_shared<ColorField>(
+                std::array<FieldPtr, 3>{field_argument(red, "red"), field_argument(green, "green"),
+                                        field_argument(blue, "blue")});
+          }),
+          "red"_a, "green"_a, "blue"_a,
+          R"(Three Fields, or numbers, that stay between 0 and 1: ValueError where they are not known to.)")
+      .def(
+          "__call__",
+          [](const ColorField& field, const py::object& points) {
+            const std::vector<Vec3> at = points_argument(points, "points");
+            py::array_t<double> out({static_cast<py::ssize_t>(at.size()), py::ssize_t{3}});
+            for (std::size_t i = 0; i < at.size(); ++i) {
+              const Color c = field.value(at[i]);
+              for (int k = 0; k < 3; ++k) out.mutable_at(i, k) = c[k];
+            }
+            return out;
+          },
+          "points"_a, R"(Colours (N, 3) at points (N, 3).)");
+  m.def(
+      "VdbColorField",
+      [](const py::object& path, const std::string& grid) {
+        const std::string file = path_argument(path, "path");
+        py::gil_scoped_release release;
+        return std::const_pointer_cast<ColorField>(load_vdb_color_field(file, grid));
+      },
+      "path"_a, "grid"_a = "albedo",
+      R"(A ColorField from a grid of vectors of a .vdb file, trilinear between its voxels, the nearest one outside.
+
+FileNotFoundError, or ValueError with a sentence: no grid of that name, another type, no active voxel, colours beyond 0 to 1.)");
   py::class_<PaintedFields>(
       m, "PaintedFields",
       R"(The fields of an object while they are painted on: the mean of a .vdb file and, where they were painted, the grids
@@ -156,7 +210,7 @@ void bind_paint(py::module_& m) {
           py::init(&open), "path"_a, py::kw_only(), "mean"_a = "mean", "sigma"_a = 1.0,
           "length_scale"_a = 1.0, "sigma_grid"_a = "", "sigma_meaning"_a = "value",
           "sigma_factor"_a = 1.0, "anisotropy"_a = false, "albedo"_a = false,
-          R"(path: a .vdb file with the grid `mean` (its name). sigma, length_scale: the object's constants, where nothing is painted.
+          R"(path: a .vdb file with the grid `mean` (its name). sigma, length_scale (or the six entries of A): the object's constants.
 
 sigma_grid: name of the file's deviation ('' for none), a 'value' or a 'variance', times sigma_factor. anisotropy, albedo: whether
 the file's grids of these names are the object's. Grids on other voxels than the mean are sampled on its nodes (an albedo is

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "binding/arguments.h"
+#include "binding/color_field_argument.h"
 #include "binding/reader.h"
 
 namespace gpis {
@@ -229,6 +230,7 @@ ObjectDescription read_object(const py::handle& value, const std::string& path, 
   o.sampler = static_cast<Sampler>(r.choice(
       "sampler", {"auto", "convolution", "markov", "spectral", "nystrom", "dense", "realisation"},
       0));
+  if (r.has("albedo")) o.albedo = color_field_argument(r.required("albedo"), r.path_of("albedo"));
   r.finish("a gpis object");
   return o;
 }

@@ -18,6 +18,27 @@ double log_length(const SymMat3& a) {
   return std::log(Cholesky3(a).determinant()) / 6;
 }
 
+// ln ℓ of the nodes of one leaf and those beside it, each computed once.
+class LogLengths {
+ public:
+  double at(const openvdb::Coord& leaf, const openvdb::Coord& c,
+            const LayerReader<TensorLayer>& tensor) {
+    if (!(leaf == leaf_)) {
+      leaf_ = leaf;
+      known_.fill(std::nan(""));
+    }
+    const openvdb::Coord i = c - leaf;
+    double& value = known_[((i.x() + 1) * kSide + i.y() + 1) * kSide + i.z() + 1];
+    if (std::isnan(value)) value = log_length(tensor.at(c));
+    return value;
+  }
+
+ private:
+  static constexpr int kSide = 10;
+  openvdb::Coord leaf_ = openvdb::Coord::max();
+  std::array<double, kSide * kSide * kSide> known_;
+};
+
 class TensorDab {
  public:
   TensorDab(const PaintLayers& layers, const Brush& brush, const DabImages& dab)
@@ -32,7 +53,7 @@ class TensorDab {
   }
 
   std::optional<SymMat3> operator()(const openvdb::Coord& c, const Vec3& x, const SymMat3& old,
-                                    PaintCounts& counts) const {
+                                    PaintCounts& counts) {
     const DabImages::Nearest near = dab_.nearest(x);
     if (near.count == 0) return std::nullopt;
     const double a = dab_.strength * brush_.falloff(near.distance / dab_.radius);
@@ -53,16 +74,18 @@ class TensorDab {
 
  private:
   std::optional<SymMat3> resized(const openvdb::Coord& c, const SymMat3& old, double a,
-                                 PaintCounts& counts) const {
-    const double log_old = log_length(old);
+                                 PaintCounts& counts) {
+    const bool smooth = brush_.operation == Operation::smooth;
+    const openvdb::Coord leaf = c & ~7;
+    const double log_old = smooth ? log_lengths_.at(leaf, c, tensor_) : log_length(old);
     double change = 0;
-    if (brush_.operation == Operation::smooth) {
+    if (smooth) {
       double sum = 0;
       for (int axis = 0; axis < 3; ++axis)
         for (int side : {-1, 1}) {
           openvdb::Coord next = c;
           next[axis] += side;
-          sum += log_length(tensor_.at(next));
+          sum += log_lengths_.at(leaf, next, tensor_);
         }
       change = sum / 6 - log_old;
     } else {
@@ -107,6 +130,7 @@ class TensorDab {
   const DabImages& dab_;
   LayerReader<TensorLayer> tensor_;
   LayerReader<ScalarLayer> mean_;
+  LogLengths log_lengths_;
   Vec3 squares_;
 };
 

@@ -153,7 +153,8 @@ struct PaintLayers {
   Affine to_object, to_index;
   Mat3 gradient_to_object;  // of differences in index space
   openvdb::math::Transform::Ptr transform;
-  double constant_sigma = 1, constant_length = 1;  // where no grid says otherwise
+  double constant_sigma = 1;  // where no grid says otherwise
+  SymMat3 constant_anisotropy = SymMat3::identity();
   Layer<ScalarLayer> mean, sigma;
   Layer<TensorLayer> anisotropy;
   Layer<ColorLayer> albedo;

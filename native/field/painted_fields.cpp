@@ -91,7 +91,7 @@ Vec3 constant_of<ColorLayer>(const PaintLayers&) {
 }
 template <>
 SymMat3 constant_of<TensorLayer>(const PaintLayers& layers) {
-  return SymMat3::identity(layers.constant_length * layers.constant_length);
+  return layers.constant_anisotropy;
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/sym_mat3.h"
 #include "field/brush.h"
 #include "field/vdb_field.h"
 
@@ -15,8 +16,9 @@ namespace gpis {
 // Where the fields come from.
 struct PaintSource {
   std::string path;
-  std::string mean = "mean";           // the name of its grid, which it keeps
-  double sigma = 1, length_scale = 1;  // of the object, where there are no painted grids
+  std::string mean = "mean";  // the name of its grid, which it keeps
+  double sigma = 1;           // of the object, where there are no painted grids
+  SymMat3 squared_lengths = SymMat3::identity();
   // A deviation that the file holds under another name: it becomes the painted one, times factor.
   std::string sigma_grid;
   GridMeaning sigma_meaning = GridMeaning::value;

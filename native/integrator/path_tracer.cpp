@@ -34,7 +34,8 @@ struct Vertex {
   Vec3 geometric_normal;  // facing the ray
   Vec3 shading_normal;
   const Material* material = nullptr;
-  int surface = -1;  // which stochastic surface, -1 for a mesh
+  Color tint = kNoTint;  // the painted albedo there
+  int surface = -1;      // which stochastic surface, -1 for a mesh
 };
 
 }  // namespace
@@ -149,7 +150,7 @@ PathSample PathTracer::Impl::trace(const Ray& camera_ray, double t_max) {
     if (bounce == 0) {
       result.depth = v.t;
       result.normal = normal;
-      result.albedo = v.material->albedo();
+      result.albedo = v.material->albedo() * v.tint;
     }
     if (!next) break;
     if (!is_finite(next->direction)) {
@@ -215,6 +216,8 @@ bool PathTracer::Impl::closest(const Ray& ray, double t_max, Vertex& v) {
     v.t = nearest;
     v.position = v.departure = ray.at(nearest);
     v.material = scene.stochastic[v.surface].material;
+    if (const auto& albedo = scene.stochastic[v.surface].albedo)
+      v.tint = albedo->value(scene.stochastic[v.surface].to_object.point(v.position));
     return true;
   }
   if (!hit_mesh) return false;
@@ -312,7 +315,8 @@ Color PathTracer::Impl::sample_lights(const Vertex& v, const Scatter& scatter,
 std::optional<ScatterSample> PathTracer::Impl::scatter_at(const Ray& ray, const Vertex& v,
                                                           Color& direct, Vec3& normal) {
   if (v.surface < 0) {
-    const SurfaceScatter scatter(*v.material, ray.direction, v.geometric_normal, v.shading_normal);
+    const SurfaceScatter scatter(*v.material, ray.direction, v.geometric_normal, v.shading_normal,
+                                 v.tint);
     normal = v.shading_normal;
     if (!scatter.specular()) direct = sample_lights(v, scatter, [](const Vec3&, PathMemory&) {});
     return scatter.sample(point(kDirectionDecision, *rng));
@@ -332,13 +336,13 @@ std::optional<ScatterSample> PathTracer::Impl::scatter_at(const Ray& ray, const 
   memory[v.surface] = surface.state(0, gradient * sign);
   normal = normalize(gradient);
   if (v.material->specular() && !law.degenerate) {
-    const MirrorScatter scatter(*v.material, ray.direction, law);
+    const MirrorScatter scatter(*v.material, ray.direction, law, v.tint);
     direct = sample_lights(v, scatter, [&](const Vec3& w, PathMemory& m) {
       m[v.surface] = surface.state(0, *scatter.gradient_for(w) * sign);
     });
     return scatter.sample(gradient);
   }
-  const SurfaceScatter scatter(*v.material, ray.direction, normal, normal);
+  const SurfaceScatter scatter(*v.material, ray.direction, normal, normal, v.tint);
   if (!scatter.specular()) direct = sample_lights(v, scatter, [](const Vec3&, PathMemory&) {});
   return scatter.sample(point(kDirectionDecision, *rng));
 }

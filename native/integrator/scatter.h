@@ -27,8 +27,9 @@ class SurfaceScatter {
  public:
   // `arriving` is the direction of the ray; the geometric normal faces it.
   SurfaceScatter(const Material& material, const Vec3& arriving, const Vec3& geometric_normal,
-                 const Vec3& shading_normal)
+                 const Vec3& shading_normal, const Color& tint = kNoTint)
       : material_(material),
+        tint_(tint),
         normal_(geometric_normal),
         // Seen from behind the shading normal only the geometric one makes sense.
         frame_(dot(shading_normal, arriving) < 0 ? shading_normal : geometric_normal),
@@ -38,18 +39,18 @@ class SurfaceScatter {
   bool specular() const { return material_.specular(); }
   Color eval(const Vec3& w) const {
     if (dot(w, normal_) <= 0) return {};
-    Color f = material_.eval(wo_, frame_.to_local(w));
-    if (bent_) f += material_.eval(wo_, frame_.to_local(flipped(w)));
+    Color f = material_.eval(wo_, frame_.to_local(w), tint_);
+    if (bent_) f += material_.eval(wo_, frame_.to_local(flipped(w)), tint_);
     return f;
   }
   double pdf(const Vec3& w) const {
     if (dot(w, normal_) <= 0) return 0;
-    double p = material_.pdf(wo_, frame_.to_local(w));
-    if (bent_) p += material_.pdf(wo_, frame_.to_local(flipped(w)));
+    double p = material_.pdf(wo_, frame_.to_local(w), tint_);
+    if (bent_) p += material_.pdf(wo_, frame_.to_local(flipped(w)), tint_);
     return p;
   }
   std::optional<ScatterSample> sample(SquarePoint at) const {
-    const std::optional<MaterialSample> s = material_.sample(wo_, at);
+    const std::optional<MaterialSample> s = material_.sample(wo_, at, tint_);
     if (!s) return std::nullopt;
     const Vec3 w = frame_.to_world(s->wi);
     if (!bent_) return ScatterSample{w, s->weight, s->specular ? kInfinity : s->pdf};
@@ -64,6 +65,7 @@ class SurfaceScatter {
   Vec3 flipped(const Vec3& w) const { return w - normal_ * (2 * dot(w, normal_)); }
 
   const Material& material_;
+  Color tint_;
   Vec3 normal_;
   Frame frame_;
   Vec3 wo_;
@@ -78,8 +80,10 @@ class SurfaceScatter {
 // dimensions.
 class MirrorScatter {
  public:
-  MirrorScatter(const Material& material, const Vec3& arriving, const GradientLaw& law)
+  MirrorScatter(const Material& material, const Vec3& arriving, const GradientLaw& law,
+                const Color& tint = kNoTint)
       : material_(material),
+        tint_(tint),
         arriving_(arriving),
         law_(law),
         across_(cross(law.b1, law.b2)),
@@ -114,10 +118,12 @@ class MirrorScatter {
 
  private:
   Color reflectance(const Vec3& w) const {
-    return material_.specular_reflectance(std::sqrt(std::max(0.0, (1 - dot(w, arriving_)) / 2)));
+    return material_.specular_reflectance(std::sqrt(std::max(0.0, (1 - dot(w, arriving_)) / 2)),
+                                          tint_);
   }
 
   const Material& material_;
+  Color tint_;
   Vec3 arriving_;
   const GradientLaw& law_;
   Vec3 across_;

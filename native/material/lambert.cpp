@@ -9,11 +9,16 @@ class Lambert final : public Material {
  public:
   explicit Lambert(const Color& color) : color_(color) {}
 
-  Color eval(const Vec3& wo, const Vec3& wi) const override { return color_ * pdf(wo, wi); }
-  double pdf(const Vec3&, const Vec3& wi) const override { return std::max(0.0, wi.z) / kPi; }
-  std::optional<MaterialSample> sample(const Vec3& wo, SquarePoint at) const override {
+  Color eval(const Vec3& wo, const Vec3& wi, const Color& tint) const override {
+    return color_ * tint * pdf(wo, wi, tint);
+  }
+  double pdf(const Vec3&, const Vec3& wi, const Color&) const override {
+    return std::max(0.0, wi.z) / kPi;
+  }
+  std::optional<MaterialSample> sample(const Vec3& wo, SquarePoint at,
+                                       const Color& tint) const override {
     const Vec3 wi = square_to_cosine_hemisphere(at.u, at.v);
-    return MaterialSample{wi, color_, pdf(wo, wi)};
+    return MaterialSample{wi, color_ * tint, pdf(wo, wi, tint)};
   }
   Color albedo() const override { return color_; }
 

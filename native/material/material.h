@@ -18,20 +18,26 @@ struct MaterialSample {
   bool specular = false;
 };
 
+// What a surface's painted albedo multiplies a material's colour with.
+inline constexpr Color kNoTint{1, 1, 1};
+
 class Material {
  public:
   virtual ~Material() = default;
   // BRDF · cos θ_i; zero below the surface, and for specular parts.
-  virtual Color eval(const Vec3& wo, const Vec3& wi) const = 0;
-  virtual double pdf(const Vec3& wo, const Vec3& wi) const = 0;
+  virtual Color eval(const Vec3& wo, const Vec3& wi, const Color& tint = kNoTint) const = 0;
+  virtual double pdf(const Vec3& wo, const Vec3& wi, const Color& tint = kNoTint) const = 0;
   // Nothing where the light is absorbed (the loss of single scattering on rough metals).
-  virtual std::optional<MaterialSample> sample(const Vec3& wo, SquarePoint at) const = 0;
+  virtual std::optional<MaterialSample> sample(const Vec3& wo, SquarePoint at,
+                                               const Color& tint = kNoTint) const = 0;
   // What the albedo pass shows.
   virtual Color albedo() const = 0;
   // True if all light goes in one direction: eval and pdf are zero, and this much is reflected at
   // angle of incidence θ.
   virtual bool specular() const { return false; }
-  virtual Color specular_reflectance(double /*cos θ*/) const { return {}; }
+  virtual Color specular_reflectance(double /*cos θ*/, const Color& /*tint*/ = kNoTint) const {
+    return {};
+  }
 };
 
 std::unique_ptr<Material> make_lambert(const Color& color);

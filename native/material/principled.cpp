@@ -23,42 +23,44 @@ class Principled final : public Material {
   Principled(const Color& color, double roughness, double metallic)
       : color_(color), ggx_(roughness), metallic_(metallic) {}
 
-  Color eval(const Vec3& wo, const Vec3& wi) const override {
+  Color eval(const Vec3& wo, const Vec3& wi, const Color& tint) const override {
     if (wi.z <= 0) return {};
+    const Color color = color_ * tint;
     const double cos = dot(wo, normalize(wo + wi));
-    const Color metal = color_ + (Color{1, 1, 1} - color_) * schlick_weight(cos);
+    const Color metal = color + (Color{1, 1, 1} - color) * schlick_weight(cos);
     const Color facets = metal * metallic_ + Color{1, 1, 1} * ((1 - metallic_) * coat_fresnel(cos));
     const double under = (1 - coat_fresnel(wo.z)) * (1 - coat_fresnel(wi.z)) / (1 - kMeanFresnel);
-    return facets * ggx_.reflect_eval(wo, wi) + color_ * ((1 - metallic_) * under * wi.z / kPi);
+    return facets * ggx_.reflect_eval(wo, wi) + color * ((1 - metallic_) * under * wi.z / kPi);
   }
-  double pdf(const Vec3& wo, const Vec3& wi) const override {
+  double pdf(const Vec3& wo, const Vec3& wi, const Color& tint) const override {
     if (wi.z <= 0) return 0;
-    const double p = facet_probability(wo);
+    const double p = facet_probability(wo, color_ * tint);
     return p * ggx_.reflect_pdf(wo, wi) + (1 - p) * wi.z / kPi;
   }
-  std::optional<MaterialSample> sample(const Vec3& wo, SquarePoint at) const override {
+  std::optional<MaterialSample> sample(const Vec3& wo, SquarePoint at,
+                                       const Color& tint) const override {
     Vec3 wi;
     // One number chooses the lobe and, stretched again, the direction in it.
-    const double p = facet_probability(wo);
+    const double p = facet_probability(wo, color_ * tint);
     if (at.u < p) {
       wi = reflect(wo, ggx_.sample_visible(wo, {at.u / p, at.v}));
       if (wi.z <= 0) return std::nullopt;
     } else {
       wi = square_to_cosine_hemisphere((at.u - p) / (1 - p), at.v);
     }
-    const double density = pdf(wo, wi);
-    return MaterialSample{wi, eval(wo, wi) / density, density};
+    const double density = pdf(wo, wi, tint);
+    return MaterialSample{wi, eval(wo, wi, tint) / density, density};
   }
   Color albedo() const override { return color_; }
 
  private:
   // Of choosing the facets: their share of the reflected light, roughly; never 0 (they exist at
   // every angle).
-  double facet_probability(const Vec3& wo) const {
+  double facet_probability(const Vec3& wo, const Color& color) const {
     const double fresnel = coat_fresnel(wo.z);
-    const double base = (1 - metallic_) * (1 - fresnel) * luminance(color_);
+    const double base = (1 - metallic_) * (1 - fresnel) * luminance(color);
     const double facets =
-        metallic_ * std::max(luminance(color_), fresnel) + (1 - metallic_) * fresnel;
+        metallic_ * std::max(luminance(color), fresnel) + (1 - metallic_) * fresnel;
     return facets / (facets + base);
   }
   Color color_;

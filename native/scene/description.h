@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/vec.h"
+#include "field/color_field.h"
 #include "process/tree.h"
 
 namespace gpis {
@@ -90,6 +91,7 @@ struct ObjectDescription {
   TreePtr process;
   Memory memory = Memory::renewal_plus;
   Sampler sampler = Sampler::automatic;
+  ColorFieldPtr albedo;  // gpis: multiplies the colours of its materials; object space
 };
 
 struct SceneDescription {

@@ -121,7 +121,8 @@ void Scene::build_objects() {
       for (std::size_t k = 0; k < surface.leaves().size(); ++k) {
         const int material = o.materials[o.materials.size() == 1 ? 0 : k];
         impl_->stochastic.push_back({surface.leaves()[k], impl_->materials[material].get(),
-                                     surface.sign(static_cast<int>(k))});
+                                     surface.sign(static_cast<int>(k)), o.albedo,
+                                     inverse(o.matrix)});
       }
       continue;
     }
@@ -177,6 +178,10 @@ std::vector<std::pair<std::string, std::string>> Scene::plan() const {
                                             (smooth ? ", roughness raised to .01" : "");
     if (!row.empty()) rows.emplace_back("materials[" + std::to_string(i) + "].model", row);
   }
+  for (std::size_t i = 0; i < d.objects.size(); ++i)
+    if (d.objects[i].albedo)
+      rows.emplace_back(EntryPath("objects", i, d.objects[i].name) + ".albedo",
+                        "a field: looked up where a ray meets the surface");
   for (const auto& b : impl_->bodies)
     for (const auto& [key, value] : b.surface.plan())
       rows.emplace_back(EntryPath("objects", b.object, d.objects[b.object].name) + ("." + key),

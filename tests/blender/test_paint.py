@@ -186,6 +186,18 @@ print("painted again and rendered", flush=True)
     assert np.isfinite(picture).all() and picture.std() > 0.01
 
 
+def test_a_painted_albedo_is_seen(stage, sphere, tmp_path):
+    """In white light, on a white surface: red is what was painted."""
+    sphere.gpis.sigma = 0.005
+    sphere.data.materials.append(support.diffuse("White", (1, 1, 1)))
+    before = support.picture(stage, tmp_path)
+    paint("ALBEDO", "SET", [(0, -1, 0)], radius=3.0, strength=1.0, color=(1, 0.25, 0), falloff="CONSTANT")
+    after = support.picture(stage, tmp_path)
+    middle = np.s_[14:22, 20:28]
+    np.testing.assert_allclose(before[middle].mean(axis=(0, 1)), (1, 1, 1), rtol=0.02)
+    np.testing.assert_allclose(after[middle].mean(axis=(0, 1)), (1, 0.25, 0), atol=0.03)
+
+
 def test_a_painted_deviation_is_rendered(stage, sphere, tmp_path):
     """Half of the sphere is made fuzzy; the other half stays crisp."""
     sphere.gpis.sigma = 0.01

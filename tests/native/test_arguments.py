@@ -85,6 +85,8 @@ def values(tmp_path_factory):
     tensors = np.broadcast_to((1.0, 1.0, 1.0, 0.0, 0.0, 0.0), (3, 3, 3, 6))
     grids = {"mean": np.zeros((3, 3, 3)), "anisotropy": tensors, "origin": (0, 0, 0), "voxel_size": 0.5}
     gn.write_vdb(folder / "field.vdb", grids)
+    colors = {"albedo": np.full((3, 3, 3, 3), 0.5), "origin": (0, 0, 0), "voxel_size": 0.5}
+    gn.write_vdb(folder / "color.vdb", colors)
     return {
         "Field": sphere,
         "FieldLine": sphere.line((0, 0, 2), (0, 0, -1)),
@@ -99,6 +101,10 @@ def values(tmp_path_factory):
         "GaussianProcess.anisotropy": None,
         "GaussianProcess.conditions": {"points": [(0, 0, 1)], "values": [0.0]},
         "inside": None,
+        "ColorField": gn.ColorField(0.5, sphere.clamped(0, 1), 1),
+        "ColorField.red": 0.5,
+        "VdbColorField.grid": "albedo",
+        "VdbColorField.path": folder / "color.vdb",
         "PaintedFields": gn.PaintedFields(folder / "field.vdb"),
         "PaintedFields.apply.channel": "albedo",
         "PaintedFields.apply.operation": "set",
@@ -125,6 +131,7 @@ def values(tmp_path_factory):
         "symmetry": (False, False, False),
         "axis": (0, 0, 1),
         "b": 0.2,
+        "blue": 1.0,
         "background": None,
         "bake_mesh_distance.path": folder / "baked.vdb",
         "bounds": None,
@@ -138,6 +145,7 @@ def values(tmp_path_factory):
         "Film.add.y": 0,
         "Film.merge.other": gn.Film(2, 2),
         "gp": process,
+        "green": sphere.clamped(0, 1),
         "grid": "mean",
         "grids": grids,
         "height": 2,
