@@ -85,6 +85,25 @@ def ball(stage):
 
 
 @pytest.fixture
+def gn(extension):
+    return importlib.import_module("gpis_native")
+
+
+@pytest.fixture
+def bake(extension):
+    """The add-on's module that bakes strokes."""
+    return importlib.import_module(extension + ".paint.bake")
+
+
+@pytest.fixture
+def painted_sphere(stage):
+    """A GPIS of a sphere of radius 1 with room around it, to be painted on."""
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24)
+    assert bpy.ops.gpis.make(resolution=32, margin=0.5) == {"FINISHED"}
+    return bpy.context.object
+
+
+@pytest.fixture
 def fresh_blender(tmp_path):
     """Runs a script in a new Blender of the same kind with an empty user folder: fresh_blender(script, *arguments).
 

@@ -128,6 +128,7 @@ def test_positive_under_any_strokes(painted, tmp_path, seed):
     assert (eigenvalues[..., 2] / eigenvalues[..., 0]).max() < 1.01 * 100**2  # lengths 10 ** ±1
     assert got["albedo"].min() >= 0 and got["albedo"].max() <= 1
     gn.VdbTensorField(tmp_path / "painted.vdb")  # checks every node itself
+    gn.VdbColorField(tmp_path / "painted.vdb")
 
 
 def test_extreme_values_are_kept_in_bounds_and_counted(painted, tmp_path):
@@ -341,3 +342,32 @@ def test_sentences(painted, call, sentence):
     with pytest.raises((ValueError, FileNotFoundError)) as caught:
         call(painted)
     assert sentence in str(caught.value)
+
+
+def test_an_albedo_tints_the_material(tmp_path):
+    """A constant albedo is the material's colour times it, to the last digit; a painted one is there in the albedo pass."""
+
+    def render(color, **painted):
+        process = gn.GaussianProcess(gn.SphereField((0, 0, 0), 0.8), 0.02, gn.SquaredExponential(0.3))
+        entry = {"name": "o", "type": "gpis", "process": process, "matrix": np.eye(4), "materials": ["m"], **painted}
+        matrix = np.eye(4)
+        matrix[2, 3] = 4
+        camera = {"type": "orthographic", "matrix": matrix, "width": 2.0}
+        material = {"type": kind, "color": color, **({} if kind in ("lambert", "mirror") else {"roughness": 0.5})}
+        scene = {"version": 1, "camera": camera, "world": {"color": (1, 1, 1)}, "materials": {"m": material}}
+        return gn.render(gn.Scene(scene | {"objects": [entry]}), 12, 12, samples=16).passes
+
+    for kind in ("lambert", "mirror", "conductor", "principled"):
+        tinted = render((0.8, 0.5, 1.0), albedo=gn.ColorField(0.5, 1.0, 0.25))
+        plain = render((0.4, 0.5, 0.25))
+        for name in ("combined", "albedo"):
+            np.testing.assert_allclose(tinted[name], plain[name], rtol=1e-6, atol=1e-7, err_msg=f"{kind} {name}")
+    kind = "lambert"
+    half = gn.BoxField((1, 0, 0), (2, 4, 4)).clamped(0, 0.01)  # 0 for x > 0
+    passes = render((1, 1, 1), albedo=gn.ColorField(100.0 * half, 1, 1))
+    middle = passes["albedo"][6]
+    assert middle[4, 0] == pytest.approx(1) and middle[8, 0] == pytest.approx(0) and middle[8, 1] == pytest.approx(1)
+    with pytest.raises(ValueError, match=r"objects\[0\].albedo must be a ColorField, it is a float"):
+        render((1, 1, 1), albedo=0.5)
+    with pytest.raises(ValueError, match="ColorField: red goes from -0.5 to"):
+        gn.ColorField(gn.SphereField((0, 0, 0), 0.5), 1, 1)
