@@ -92,6 +92,20 @@ std::vector<Vec3> points_argument(const py::handle& value, const char* name) {
   return points;
 }
 
+Affine affine_argument(const NumberArray& m) {
+  if (m.ndim() != 2 || m.shape(0) != 4 || m.shape(1) != 4)
+    throw std::invalid_argument("transformed: the matrix has the shape " +
+                                py::str(py::tuple(m.attr("shape"))).cast<std::string>() +
+                                "; it takes (4, 4).");
+  if (m.at(3, 0) != 0 || m.at(3, 1) != 0 || m.at(3, 2) != 0 || m.at(3, 3) != 1)
+    throw std::invalid_argument(
+        "transformed: the last row of the matrix is not (0, 0, 0, 1): it takes an affine map.");
+  Affine a;
+  for (int i = 0; i < 3; ++i) a.linear.row[i] = {m.at(i, 0), m.at(i, 1), m.at(i, 2)};
+  a.translation = {m.at(0, 3), m.at(1, 3), m.at(2, 3)};
+  return a;
+}
+
 NumberArray numbers_argument(const py::handle& value, py::ssize_t count, const char* sentence) {
   const auto a = NumberArray::ensure(value);
   if (!a || a.ndim() != 1 || a.shape(0) != count) {

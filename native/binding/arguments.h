@@ -54,6 +54,9 @@ Vec3 point_of(const NumberArray& rows, std::size_t i, const char* name);
 // All of them.
 std::vector<Vec3> points_argument(const pybind11::handle& value, const char* name);
 
+// A matrix (4, 4) whose last row is (0, 0, 0, 1).
+Affine affine_argument(const NumberArray& matrix);
+
 // An array of `count` numbers; `sentence` refuses anything else.
 NumberArray numbers_argument(const pybind11::handle& value, pybind11::ssize_t count,
                              const char* sentence);

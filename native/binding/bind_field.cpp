@@ -64,17 +64,6 @@ Array gradients_at(const Field& field, const Array& points) {
   return out;
 }
 
-Affine affine_argument(const Array& m) {
-  if (m.ndim() != 2 || m.shape(0) != 4 || m.shape(1) != 4)
-    refuse("transformed: the matrix has the shape ", shape_text(m), "; it takes (4, 4).");
-  if (m.at(3, 0) != 0 || m.at(3, 1) != 0 || m.at(3, 2) != 0 || m.at(3, 3) != 1)
-    refuse("transformed: the last row of the matrix is not (0, 0, 0, 1): it takes an affine map.");
-  Affine a;
-  for (int i = 0; i < 3; ++i) a.linear.row[i] = row(m, i);
-  a.translation = {m.at(0, 3), m.at(1, 3), m.at(2, 3)};
-  return a;
-}
-
 std::shared_ptr<GridField> make_grid(const Array& values, const py::object& voxel_size,
                                      const Triple& origin, std::optional<double> background) {
   if (values.ndim() != 3)

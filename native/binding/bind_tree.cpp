@@ -4,6 +4,8 @@
 
 #include "binding/arguments.h"
 #include "binding/bindings.h"
+#include "field/check.h"
+#include "process/transformed.h"
 #include "process/tree_surface.h"
 
 namespace gpis {
@@ -12,11 +14,11 @@ using namespace py::literals;
 namespace {
 
 TreePtr combined(ProcessTree::Kind kind, const py::args& operands, bool shared_noise,
-                 const std::string& name) {
+                 const std::string& name, double blend = 0) {
   std::vector<TreePtr> parts;
   for (std::size_t i = 0; i < operands.size(); ++i)
     parts.push_back(tree_argument(operands[i], name + ": operand " + std::to_string(i)));
-  return ProcessTree::combine(kind, parts, shared_noise, name);
+  return ProcessTree::combine(kind, parts, shared_noise, name, blend);
 }
 
 NumberArray composed(const ProcessTree& tree, const py::object& leaf_values) {
@@ -29,10 +31,12 @@ NumberArray composed(const ProcessTree& tree, const py::object& leaf_values) {
   }
   NumberArray out(std::vector<py::ssize_t>(values.shape(), values.shape() + values.ndim() - 1));
   const double* row = values.data();
-  for (py::ssize_t i = 0; i < out.size(); ++i, row += leaves)
-    out.mutable_data()[i] =
-        tree.winner(tree.root(), [&](int leaf) { return tree.leaves()[leaf].sign * row[leaf]; })
-            .value;
+  std::vector<double> with_sign(leaves);
+  for (py::ssize_t i = 0; i < out.size(); ++i, row += leaves) {
+    for (py::ssize_t leaf = 0; leaf < leaves; ++leaf)
+      with_sign[leaf] = tree.leaves()[leaf].sign * row[leaf];
+    out.mutable_data()[i] = tree.compose(with_sign.data(), nullptr);
+  }
   return out;
 }
 
@@ -56,7 +60,7 @@ void bind_tree(py::module_& m) {
           "them.")
       .def("compose", &composed, "values"_a,
            "F (…) from values (…, leaves) of the leaves: least for unions, greatest for "
-           "intersections, complements negated.")
+           "intersections, complements negated, smooth unions blended.")
       .def(
           "plan",
           [](const std::shared_ptr<ProcessTree>& tree) {
@@ -67,8 +71,26 @@ void bind_tree(py::module_& m) {
             return out;
           },
           "What a render of this tree chooses and leaves out.")
+      .def(
+          "transformed",
+          [](const ProcessTree& tree, const NumberArray& matrix) {
+            return std::const_pointer_cast<ProcessTree>(transformed(tree, affine_argument(matrix)));
+          },
+          "matrix"_a, "The tree moved by an affine matrix (4, 4), all its leaves with it.")
       .def("__repr__",
            [](const ProcessTree& tree) { return "<ProcessTree " + tree.describe() + ">"; });
+
+  py::reinterpret_borrow<py::class_<GaussianProcess, std::shared_ptr<GaussianProcess>>>(
+      m.attr("GaussianProcess"))
+      .def(
+          "transformed",
+          [](const GaussianProcess& gp, const NumberArray& matrix) {
+            return transformed(gp, affine_argument(matrix));
+          },
+          "matrix"_a,
+          "The process moved by an affine matrix (4, 4): its f at x is that at matrix⁻¹ x, not "
+          "rescaled; length scales are\nstretched and turned along. Bounds become the box around "
+          "the moved ones. ValueError if the matrix is singular.");
 
   m.def(
       "union",
@@ -80,6 +102,17 @@ void bind_tree(py::module_& m) {
       "Inside where any operand is: the least of their f. Operands are GaussianProcesses or "
       "trees.\nshared_noise: all leaves below see the same g; their kernels must be equal. "
       "Otherwise leaves are independent.");
+  m.def(
+      "smooth_union",
+      [](const py::args& operands, double blend, bool shared_noise) {
+        check_positive("smooth_union: blend", blend);
+        return std::const_pointer_cast<ProcessTree>(
+            combined(ProcessTree::Kind::least, operands, shared_noise, "smooth_union", blend));
+      },
+      "blend"_a, "shared_noise"_a = false,
+      "A union whose crease is rounded where two operands are within `blend` of each other: "
+      "min - max(0, blend - |a - b|)²/4blend, one\noperand after the other. For "
+      "compose_and_fit; renders refuse it.");
   m.def(
       "intersection",
       [](const py::args& operands, bool shared_noise) {

@@ -83,7 +83,8 @@ void write(const py::object& path, const py::dict& grids) {
       refuse("write_vdb: the dict has the key ", py::repr(key).cast<std::string>(),
              "; the name of a grid is a text.");
     const auto name = key.cast<std::string>();
-    if (name == "origin" || name == "voxel_size") continue;
+    // `counters` say how a fit was made.
+    if (name == "origin" || name == "voxel_size" || name == "counters") continue;
     const auto a = FloatArray::ensure(value);
     if (!a) {
       PyErr_Clear();
@@ -232,7 +233,7 @@ name, type ('float', 'vec3s', ...), resolution (3,) nodes of the box of active v
         R"(Writes a new .vdb file from a dict of arrays on the same nodes.
 
 grids: origin (3,), voxel_size (a number or three), and arrays (X, Y, Z), (X, Y, Z, 3), or (X, Y, Z, 6) as 'anisotropy' (entries
-xx,yy,zz,xy,xz,yz, kept as two vector grids). Single precision; every node is active. ValueError, FileNotFoundError (folder).)");
+xx,yy,zz,xy,xz,yz, kept as two vector grids). What compose_and_fit returns is such a dict; its counters are left out. Single precision; every node is active. ValueError, FileNotFoundError (folder).)");
   m.def(
       "read_vdb", &read, "path"_a, py::kw_only(), "names"_a = std::vector<std::string>{},
       R"(Grids of a .vdb file as a dict of arrays (X, Y, Z) or (X, Y, Z, 3), 'anisotropy' (X, Y, Z, 6), origin and voxel_size.

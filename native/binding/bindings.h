@@ -15,6 +15,7 @@ void bind_process(pybind11::module_& m);
 void bind_realisation(pybind11::module_& m);
 void bind_tree(pybind11::module_& m);
 void bind_first_hits(pybind11::module_& m);
+void bind_fit(pybind11::module_& m);
 void bind_scene(pybind11::module_& m);
 void bind_film(pybind11::module_& m);
 void bind_render(pybind11::module_& m);

@@ -27,6 +27,7 @@ PYBIND11_MODULE(gpis_native, m) {
   gpis::bind_realisation(m);
   gpis::bind_tree(m);
   gpis::bind_first_hits(m);
+  gpis::bind_fit(m);
   gpis::bind_scene(m);
   gpis::bind_film(m);
   gpis::bind_render(m);

@@ -1,6 +1,7 @@
 #include "process/lattice_field.h"
 
 #include <Eigen/Core>
+#include <algorithm>
 
 namespace gpis {
 namespace {
@@ -93,47 +94,93 @@ FieldSample Lattice::sample(LatticeNoise& noise, const Vec3& x) {
   return {(ww * weight).sum(), transpose(factor_) * slope};
 }
 
-void Lattice::line(LatticeNoise& noise, const Vec3& x, double spacing, int count, double* g) {
-  const double step = factor_.row[0].z * spacing;
-  if (thin_ & 1) {  // constant everywhere
-    std::fill(g, g + count, sample(noise, x).value);
-    return;
-  }
-  // Points further apart than a window share no nodes: no row is worth making.
-  if (std::abs(step) > 0.5 * kNodes * GaussianWindow::kStep) {
-    for (int n = 0; n < count; ++n) g[n] = sample(noise, x + Vec3{0, 0, n * spacing}).value;
-    return;
-  }
+void Lattice::box(LatticeNoise& noise, const Vec3& x, double spacing,
+                  const std::array<int, 3>& size, double* g) {
+  const std::ptrdiff_t row = size[2];
+  box(noise, x, spacing, size, row * size[1], row, g);
+}
+
+void Lattice::box(LatticeNoise& noise, const Vec3& x, double spacing,
+                  const std::array<int, 3>& size, std::ptrdiff_t slice, std::ptrdiff_t row,
+                  double* g) {
   const Vec3 y = factor_ * x;
-  const Axis a1(y.y, thin_ & 2), a2(y.z, thin_ & 4);
-  const double y_end = y.x + (count - 1) * step;
-  std::int64_t first = GaussianWindow(std::min(y.x, y_end)).first,
-               last = GaussianWindow(std::max(y.x, y_end)).first + kNodes - 1;
-  // The row before had the same nodes, or some a little further along: a margin saves reading most
-  // of them again.
-  const Node at{first, a1.window.first, a2.window.first};
-  const bool kept = window_.generation == noise.generation() && window_.first[1] == at[1] &&
-                    window_.first[2] == at[2] && window_.first[0] <= first &&
-                    window_.first[0] + window_.size[0] > last;
-  if (kept) {
-    first = window_.first[0];
-    last = first + window_.size[0] - 1;
-  } else {
-    first -= kNodes;
-    last += kNodes;
+  const Mat3 step = factor_ * spacing;  // row a: of whitened coordinate a, per i, j and k
+  // The nodes that any point of the box reads.
+  Node first;
+  std::array<int, 3> nodes;
+  double count = 1;
+  for (int a = 0; a < 3; ++a) {
+    if (thin_ >> a & 1) {
+      first[a] = 0;
+      nodes[a] = 1;
+      continue;
+    }
+    double low = y[a], high = y[a];
+    for (int axis = 0; axis < 3; ++axis) {
+      const double span = step.row[a][axis] * (size[axis] - 1);
+      (span < 0 ? low : high) += span;
+    }
+    // Rounding may put a point one node further.
+    first[a] = GaussianWindow(low).first - 1;
+    nodes[a] = static_cast<int>(
+        std::min<std::int64_t>(GaussianWindow(high).first + kNodes + 1 - first[a], 1 << 20));
+    count *= nodes[a];
   }
-  const int nodes = static_cast<int>(last - first + 1);
-  const double* normals = window(noise, {first, at[1], at[2]}, {nodes, a1.nodes, a2.nodes});
-  row_.resize(nodes);
-  Eigen::Map<Eigen::ArrayXd> row(row_.data(), nodes);
-  row.setZero();
-  for (int j = 0; j < a2.nodes; ++j)
-    for (int i = 0; i < a1.nodes; ++i, normals += nodes)
-      row += (a1.window.weight[i] * a2.window.weight[j]) *
-             Eigen::Map<const Eigen::ArrayXd>(normals, nodes);
-  for (int n = 0; n < count; ++n) {
-    const GaussianWindow a0(y.x + n * step);
-    g[n] = (ConstRow(row_.data() + (a0.first - first)) * ConstRow(a0.weight)).sum();
+  // Points far apart share few nodes: halves, down to where there are few (a point has 18³).
+  constexpr double kMostNodes = 1 << 17;
+  const int longest = static_cast<int>(std::max_element(size.begin(), size.end()) - size.begin());
+  if (count > kMostNodes) {
+    std::array<int, 3> part = size;
+    part[longest] /= 2;
+    box(noise, x, spacing, part, slice, row, g);
+    const std::array<std::ptrdiff_t, 3> stride{slice, row, 1};
+    Vec3 middle = x;
+    middle[longest] += part[longest] * spacing;
+    g += part[longest] * stride[longest];
+    part[longest] = size[longest] - part[longest];
+    box(noise, middle, spacing, part, slice, row, g);
+    return;
+  }
+
+  const double* normals = window(noise, first, nodes);
+  const std::ptrdiff_t n0 = nodes[0], n10 = n0 * nodes[1];
+  plane_.resize(n10);
+  row_.resize(n0 + kNodes);
+  using Array = Eigen::Map<Eigen::ArrayXd>;
+  using ConstArray = Eigen::Map<const Eigen::ArrayXd>;
+  // Coordinate 0 is the same function of k in every row, up to a constant that is none where the
+  // axes are not sheared.
+  const bool sheared = step.row[0].x != 0 || step.row[0].y != 0;
+  const auto windows_from = [&](double y0) {
+    along_.clear();
+    for (int k = 0; k < size[2]; ++k) along_.emplace_back(y0 + k * step.row[0].z);
+  };
+  const bool constant = thin_ & 1;
+  if (!sheared && !constant) windows_from(y.x);
+  for (int i = 0; i < size[0]; ++i) {
+    const Axis a2(y.z + i * step.row[2].x, thin_ & 4);
+    Array plane(plane_.data(), n10);
+    plane.setZero();
+    for (int n = 0; n < a2.nodes; ++n)
+      plane +=
+          a2.window.weight[n] * ConstArray(normals + (a2.window.first - first[2] + n) * n10, n10);
+    for (int j = 0; j < size[1]; ++j) {
+      const Axis a1(y.y + i * step.row[1].x + j * step.row[1].y, thin_ & 2);
+      Array along(row_.data(), n0);
+      along.setZero();
+      for (int n = 0; n < a1.nodes; ++n)
+        along += a1.window.weight[n] *
+                 ConstArray(plane_.data() + (a1.window.first - first[1] + n) * n0, n0);
+      double* out = g + i * slice + j * row;
+      if (constant) {
+        std::fill(out, out + size[2], row_[0]);
+        continue;
+      }
+      if (sheared) windows_from(y.x + i * step.row[0].x + j * step.row[0].y);
+      for (int k = 0; k < size[2]; ++k)
+        out[k] = (ConstRow(row_.data() + (along_[k].first - first[0])) * ConstRow(along_[k].weight))
+                     .sum();
+    }
   }
 }
 
@@ -159,18 +206,28 @@ void LatticeField::add(LatticeNoise& noise, const Vec3& x, FieldSample& g) {
                 wave_vector_ * (c * second.value - s * first.value);
 }
 
-void LatticeField::add_line(LatticeNoise& noise, const Vec3& x, double spacing, int count,
-                            double* g) {
+void LatticeField::add_box(LatticeNoise& noise, const Vec3& x, double spacing,
+                           const std::array<int, 3>& size, float* g) {
+  const std::size_t count = static_cast<std::size_t>(size[0]) * size[1] * size[2];
   scratch_.resize(count);
-  lattices_[0].line(noise, x, spacing, count, scratch_.data());
+  lattices_[0].box(noise, x, spacing, size, scratch_.data());
   if (lattices_.size() == 1) {
-    for (int n = 0; n < count; ++n) g[n] += scale_ * scratch_[n];
+    for (std::size_t n = 0; n < count; ++n) g[n] += static_cast<float>(scale_ * scratch_[n]);
     return;
   }
-  const double theta = dot(wave_vector_, x), turn = wave_vector_.z * spacing;
-  for (int n = 0; n < count; ++n) g[n] += scale_ * std::cos(theta + n * turn) * scratch_[n];
-  lattices_[1].line(noise, x, spacing, count, scratch_.data());
-  for (int n = 0; n < count; ++n) g[n] += scale_ * std::sin(theta + n * turn) * scratch_[n];
+  const auto add = [&](const auto& wave) {
+    std::size_t n = 0;
+    for (int i = 0; i < size[0]; ++i)
+      for (int j = 0; j < size[1]; ++j)
+        for (int k = 0; k < size[2]; ++k, ++n) {
+          const double theta =
+              dot(wave_vector_, x + Vec3{double(i), double(j), double(k)} * spacing);
+          g[n] += static_cast<float>(scale_ * wave(theta) * scratch_[n]);
+        }
+  };
+  add([](double theta) { return std::cos(theta); });
+  lattices_[1].box(noise, x, spacing, size, scratch_.data());
+  add([](double theta) { return std::sin(theta); });
 }
 
 double LatticeField::fourth_derivative_variance(const Vec3& d) const {

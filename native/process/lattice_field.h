@@ -23,8 +23,10 @@ class Lattice {
   Lattice(const Mat3& whitening, int number);
 
   FieldSample sample(LatticeNoise& noise, const Vec3& x);
-  // g at x + n (0, 0, spacing), n = 0 … count - 1.
-  void line(LatticeNoise& noise, const Vec3& x, double spacing, int count, double* g);
+  // g at x + (i, j, k) spacing, 0 <= i, j, k < size, k contiguous: axis by axis, so that a point
+  // costs one sum over one axis.
+  void box(LatticeNoise& noise, const Vec3& x, double spacing, const std::array<int, 3>& size,
+           double* g);
 
  private:
   // The whitened coordinates in echelon form from z up: only the first depends on z. The rows of a
@@ -41,8 +43,11 @@ class Lattice {
     std::vector<double> normals;
   };
   const double* window(LatticeNoise& noise, const Node& first, const std::array<int, 3>& size);
+  void box(LatticeNoise& noise, const Vec3& x, double spacing, const std::array<int, 3>& size,
+           std::ptrdiff_t slice, std::ptrdiff_t row, double* g);
   Window window_;
-  std::vector<double> row_;  // of `line`: normals summed over the other two axes
+  std::vector<double> plane_, row_;  // of `box`: normals summed over one and two axes
+  std::vector<GaussianWindow> along_;
 };
 
 class LatticeField {
@@ -52,7 +57,8 @@ class LatticeField {
   int lattices() const { return static_cast<int>(lattices_.size()); }
 
   void add(LatticeNoise& noise, const Vec3& x, FieldSample& g);
-  void add_line(LatticeNoise& noise, const Vec3& x, double spacing, int count, double* g);
+  void add_box(LatticeNoise& noise, const Vec3& x, double spacing, const std::array<int, 3>& size,
+               float* g);
   // Of the fourth derivative along d.
   double fourth_derivative_variance(const Vec3& d) const;
 

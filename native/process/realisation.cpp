@@ -167,15 +167,7 @@ void Realisation::fill(const Vec3& origin, double spacing, const std::array<int,
   const std::size_t slice = static_cast<std::size_t>(size[1]) * size[2];
   std::fill(g, g + slice * size[0], 0.0f);
   const auto row = [&](int i, int j) { return g + i * slice + j * size[2]; };
-  row_.resize(size[2]);
-  for (LatticeField& field : lattices_)
-    for (int j = 0; j < size[1]; ++j)
-      for (int i = 0; i < size[0]; ++i) {  // neighbours share most of their nodes
-        std::fill(row_.begin(), row_.end(), 0.0);
-        field.add_line(noise_, origin + Vec3{i * spacing, j * spacing, 0}, spacing, size[2],
-                       row_.data());
-        for (int k = 0; k < size[2]; ++k) row(i, j)[k] += static_cast<float>(row_[k]);
-      }
+  for (LatticeField& field : lattices_) field.add_box(noise_, origin, spacing, size, g);
   if (varying_)
     for (int j = 0; j < size[1]; ++j)
       for (int i = 0; i < size[0]; ++i)

@@ -65,7 +65,6 @@ class Realisation {
   std::optional<double> time_;
   bool drawn_ = false;
   Vec3 origin_, direction_;
-  std::vector<double> row_;
 };
 
 }  // namespace gpis

@@ -5,7 +5,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
-#include "field/check.h"
+#include "process/node_grid.h"
 #include "process/realisation.h"
 
 namespace gpis {
@@ -20,21 +20,8 @@ int arena_of(int threads) {
 }
 
 RealisationGrid empty_grid(const RealisationQuery& query) {
-  const Vec3 size = query.bounds.max - query.bounds.min;
-  if (!(is_finite(size) && size.x > 0 && size.y > 0 && size.z > 0))
-    refuse("The bounds of a realisation go from ", query.bounds.min, " to ", query.bounds.max,
-           "; every side must be finite and of positive length.");
-  if (query.resolution < 2 || query.resolution > 512)
-    refuse("resolution is ", query.resolution, "; it takes 2 to 512 nodes along the longest side.");
-  RealisationGrid grid;
-  grid.origin = query.bounds.min;
-  grid.voxel_size = max_component(size) / (query.resolution - 1);
-  for (int axis = 0; axis < 3; ++axis)
-    grid.resolution[axis] =
-        std::max(2, static_cast<int>(std::ceil(size[axis] / grid.voxel_size - 1e-9)) + 1);
-  grid.values.resize(static_cast<std::size_t>(grid.resolution[0]) * grid.resolution[1] *
-                     grid.resolution[2]);
-  return grid;
+  const NodeGrid nodes(query.bounds, query.resolution, "realisation");
+  return {nodes.resolution, nodes.voxel_size, nodes.origin, std::vector<float>(nodes.count())};
 }
 
 }  // namespace

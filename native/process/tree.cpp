@@ -1,12 +1,25 @@
 #include "process/tree.h"
 
+#include <algorithm>
+
 #include "field/check.h"
 
 namespace gpis {
 namespace {
 
+// But for rounding: a kernel that was turned there and back is what it was.
 bool same(const Vec3& a, const Vec3& b) {
-  return a.x == b.x && a.y == b.y && a.z == b.z;
+  return length(a - b) <= 1e-12 * (length(a) + length(b));
+}
+
+bool same_metric(const Mat3& a, const Mat3& b) {
+  const Mat3 p = transpose(a) * a, q = transpose(b) * b;
+  double difference = 0, size = 0;
+  for (int k = 0; k < 3; ++k) {
+    difference += length(p.row[k] - q.row[k]);
+    size += length(p.row[k]);
+  }
+  return difference <= 1e-12 * size;
 }
 
 // The same correlation: weights apart, which the deviation takes over (definitions E9).
@@ -21,8 +34,7 @@ bool same_noise(const GaussianProcess& a, const GaussianProcess& b) {
     if (s.radial.family != t.radial.family || s.radial.alpha != t.radial.alpha ||
         s.weight * vy != t.weight * vx || !same(s.wave_vector, t.wave_vector))
       return false;
-    for (int k = 0; k < 3; ++k)
-      if (!same(s.whitening.row[k], t.whitening.row[k])) return false;
+    if (!same_metric(s.whitening, t.whitening)) return false;
   }
   return true;
 }
@@ -38,12 +50,18 @@ TreePtr ProcessTree::single(std::shared_ptr<const GaussianProcess> process) {
 }
 
 TreePtr ProcessTree::combine(Kind kind, const std::vector<TreePtr>& parts, bool shared_noise,
-                             const std::string& name) {
+                             const std::string& name, double blend) {
   if (parts.empty()) refuse("", name, " takes at least one operand.");
   if (parts.size() == 1 && !shared_noise) return parts[0];
+  if (blend > 0 && parts.size() > 2) {  // one after the other
+    const std::vector<TreePtr> but_last(parts.begin(), parts.end() - 1);
+    return combine(kind, {combine(kind, but_last, shared_noise, name, blend), parts.back()},
+                   shared_noise, name, blend);
+  }
   auto tree = std::make_shared<ProcessTree>();
   Node top;
   top.kind = kind;
+  top.blend = parts.size() > 1 ? blend : 0;
   for (const TreePtr& part : parts) {
     const int first_leaf = static_cast<int>(tree->leaves_.size());
     const int first_node = static_cast<int>(tree->nodes_.size());
@@ -65,11 +83,7 @@ TreePtr ProcessTree::combine(Kind kind, const std::vector<TreePtr>& parts, bool 
     top.children.push_back(tree->root());
   }
   if (shared_noise) {
-    for (const Leaf& leaf : tree->leaves_)
-      if (!same_noise(*tree->leaves_[0].process, *leaf.process))
-        refuse("", name, " with shared_noise=True takes operands of one kernel; these have ",
-               tree->leaves_[0].process->kernel->describe(), " and ",
-               leaf.process->kernel->describe(), ".");
+    tree->check_one_kernel(name + " with shared_noise=True");
     for (const Leaf& leaf : tree->leaves_)
       if (leaf.process->conditions && tree->leaves_.size() > 1)
         refuse("", name,
@@ -82,6 +96,14 @@ TreePtr ProcessTree::combine(Kind kind, const std::vector<TreePtr>& parts, bool 
   return tree;
 }
 
+void ProcessTree::check_one_kernel(const std::string& name) const {
+  for (const Leaf& leaf : leaves_)
+    if (!same_noise(*leaves_[0].process, *leaf.process))
+      refuse("", name, " takes operands of one kernel; these have ",
+             leaves_[0].process->kernel->describe(), " and ", leaf.process->kernel->describe(),
+             ".");
+}
+
 TreePtr ProcessTree::complement(const ProcessTree& of) {
   auto tree = std::make_shared<ProcessTree>(of);
   for (Leaf& leaf : tree->leaves_) leaf.sign = -leaf.sign;
@@ -91,15 +113,70 @@ TreePtr ProcessTree::complement(const ProcessTree& of) {
   return tree;
 }
 
+bool ProcessTree::has_blends() const {
+  return std::any_of(nodes_.begin(), nodes_.end(), [](const Node& n) { return n.blend > 0; });
+}
+
+double ProcessTree::compose(const double* values, double* weights) const {
+  // Nodes in order: children before their parents, so values go up and weights come down.
+  thread_local std::vector<double> value, weight;
+  value.resize(nodes_.size());
+  for (std::size_t k = 0; k < nodes_.size(); ++k) {
+    const Node& n = nodes_[k];
+    if (n.kind == Kind::leaf) {
+      value[k] = values[n.leaf];
+      continue;
+    }
+    const double sign = n.kind == Kind::least ? 1 : -1;
+    double best = kInfinity, other = kInfinity;
+    for (const int child : n.children) {
+      const double v = sign * value[child];
+      other = std::min(other, std::max(best, v));
+      best = std::min(best, v);
+    }
+    // The quadratic smooth minimum: min - (k - |a - b|)²₊/4k.
+    const double overlap = n.blend > 0 ? std::max(n.blend - (other - best), 0.0) : 0.0;
+    value[k] = sign * (overlap > 0 ? best - overlap * overlap / (4 * n.blend) : best);
+  }
+  if (weights) {
+    weight.assign(nodes_.size(), 0.0);
+    weight.back() = 1;
+    for (std::size_t k = nodes_.size(); k-- > 0;) {
+      const Node& n = nodes_[k];
+      if (n.kind == Kind::leaf) {
+        weights[n.leaf] = weight[k];
+        continue;
+      }
+      const bool least = n.kind == Kind::least;
+      const auto wins = [&](int a, int b) {
+        return least ? value[a] < value[b] : value[a] > value[b];
+      };
+      int winner = n.children[0];
+      for (const int child : n.children)
+        if (wins(child, winner)) winner = child;
+      double share = 0;
+      if (n.blend > 0) {
+        const int other = winner == n.children[0] ? n.children[1] : n.children[0];
+        share = std::max(n.blend - std::abs(value[other] - value[winner]), 0.0) / (2 * n.blend);
+        weight[other] = share * weight[k];
+      }
+      weight[winner] = (1 - share) * weight[k];
+    }
+  }
+  return value.back();
+}
+
 std::string ProcessTree::describe(int node) const {
   const Node& n = nodes_[node];
   if (n.kind == Kind::leaf) {
     const std::string leaf = std::to_string(n.leaf);
     return leaves_[n.leaf].sign > 0 ? leaf : "complement(" + leaf + ")";
   }
-  std::string text = n.kind == Kind::least ? "union(" : "intersection(";
+  std::string text = n.blend > 0 ? "smooth_" : "";
+  text += n.kind == Kind::least ? "union(" : "intersection(";
   for (std::size_t i = 0; i < n.children.size(); ++i)
     text += (i ? ", " : "") + describe(n.children[i]);
+  if (n.blend > 0) text += ", blend=" + number_text(n.blend);
   return text + ")";
 }
 

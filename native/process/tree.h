@@ -1,7 +1,8 @@
 // A tree of processes composed per realisation (definitions B6): union is the least of its parts,
 // intersection the greatest, difference max(a, -b), complement -a. Normal form: complements are
 // pushed down to the leaves (De Morgan), so inner nodes are least and greatest alone and every sign
-// of F follows from signs of leaves. Immutable.
+// of F follows from signs of leaves. A smooth union rounds the crease where two parts are within
+// its blend radius of each other; fits compose it, marches refuse it. Immutable.
 #pragma once
 
 #include <memory>
@@ -29,20 +30,38 @@ class ProcessTree {
     int leaf = -1;
     int noise = -1;  // all leaves below see this g, -1: they differ
     std::vector<int> children;
+    double blend = 0;  // two children; 0: no blend
   };
 
   static TreePtr single(std::shared_ptr<const GaussianProcess> process);
   // `shared_noise`: all leaves below see the same g. Throws std::invalid_argument where their
-  // kernels differ. `name` is what the caller calls it.
+  // kernels differ. `name` is what the caller calls it. `blend`: radius of a smooth union or
+  // intersection, of the parts one after the other.
   static TreePtr combine(Kind kind, const std::vector<TreePtr>& parts, bool shared_noise,
-                         const std::string& name);
+                         const std::string& name, double blend = 0);
   static TreePtr complement(const ProcessTree& tree);
+
+  // The same tree of other processes; one object that is several leaves stays one.
+  template <class Change>
+  TreePtr with_leaves(const Change& change) const {
+    auto tree = std::make_shared<ProcessTree>(*this);
+    for (std::size_t i = 0; i < leaves_.size(); ++i) {
+      std::size_t first = 0;
+      while (leaves_[first].process != leaves_[i].process) ++first;
+      tree->leaves_[i].process =
+          first < i ? tree->leaves_[first].process : change(*leaves_[i].process);
+    }
+    return tree;
+  }
 
   const std::vector<Leaf>& leaves() const { return leaves_; }
   const std::vector<Node>& nodes() const { return nodes_; }  // children before their parents
   int root() const { return static_cast<int>(nodes_.size()) - 1; }
   int noises() const { return noises_; }
   bool is_single() const { return nodes_.size() == 1 && leaves_[0].sign > 0; }
+  bool has_blends() const;
+  // Refuses leaves whose kernels differ, which cannot see one and the same g.
+  void check_one_kernel(const std::string& name) const;
 
   // -1, 1 or 0 (unknown) at a node, from those of the leaves times their sign. Leaves are asked in
   // order and only while they can matter.
@@ -69,7 +88,7 @@ class ProcessTree {
     for (const int child : n.children) undecided(child, sign_of_leaf, visit);
   }
 
-  // F and the leaf it comes from, from values of the leaves times their sign.
+  // F and the leaf it comes from, from values of the leaves times their sign. No blends.
   struct Winner {
     double value;
     int leaf;
@@ -85,6 +104,10 @@ class ProcessTree {
     }
     return best;
   }
+
+  // F from values of the leaves times their sign, blends and all, and ∂F/∂(each of them) unless
+  // `weights` is null.
+  double compose(const double* values, double* weights) const;
 
   // As it was put together, leaves by index: "difference(union(0, 1), 2)" in normal form.
   std::string describe() const { return describe(root()); }

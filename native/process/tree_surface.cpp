@@ -32,6 +32,10 @@ Box3 box_of(const ProcessTree& tree, int node, const std::vector<ProcessSurface>
 TreeSurface::TreeSurface(TreePtr tree, const Affine& object_to_world, Memory memory,
                          Sampler sampler, double missed_root)
     : tree_(std::move(tree)), inside_out_(ProcessTree::complement(*tree_)) {
+  if (tree_->has_blends())
+    throw std::invalid_argument("the tree " + tree_->describe() +
+                                " has a smooth union, which is not marched: fit it "
+                                "(compose_and_fit) and render the fit.");
   const auto& leaves = tree_->leaves();
   for (std::size_t i = 0; i < leaves.size(); ++i) {
     try {

@@ -15,7 +15,7 @@ OPERATORS = {"__repr__", "__add__", "__radd__", "__sub__", "__rsub__", "__mul__"
 
 
 # Operands without names, any number of them: tests/native/test_csg.py has their sentences.
-VARIADIC = {"union", "intersection"}
+VARIADIC = {"union", "smooth_union", "intersection"}
 
 
 class Odd:
@@ -134,7 +134,12 @@ def values(tmp_path_factory):
         "blue": 1.0,
         "background": None,
         "bake_mesh_distance.path": folder / "baked.vdb",
+        "blend": 0.0,
         "bounds": None,
+        "certainty": 5.0,
+        "compose_and_fit.bounds": [(-1, -1, -1), (1, 1, 1)],
+        "compose_and_fit_plan.bounds": [(-1, -1, -1), (1, 1, 1)],
+        "correlation": 0.0,
         "center": (0, 0, 0),
         "description": description,
         "direction": (0, 0, -1),
@@ -162,12 +167,15 @@ def values(tmp_path_factory):
         "mean": sphere,
         "meaning": "value",
         "memory": "none",
+        "method": "sample",
         "minor_radius": 0.2,
         "n": 2,
         "names": ["mean"],
         "noise_threshold": None,
         "normal": (0, 0, 1),
         "nu": 1.5,
+        "op": "union",
+        "operands": [process, process],
         "origin": (0, 0, 0),
         "origins": points,
         "path": folder / "field.vdb",
@@ -183,6 +191,7 @@ def values(tmp_path_factory):
         "progress": None,
         "radiance": np.ones((16, 3)),
         "radius": 0.5,
+        "realisations": 4,
         "RenderResult.save.path": folder / "saved.npz",
         "resolution": 8,
         "results": [result],

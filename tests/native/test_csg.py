@@ -439,6 +439,74 @@ def test_first_hits_of_global_are_those_of_lines(name, n, seed):
         check_same_distribution(*pair, f"{name}: gradient {axis}")
 
 
+MOVED = np.array([[0.8, -0.9, 0.2, 0.4], [0.5, 0.7, -0.3, -0.2], [0.1, 0.3, 1.2, 0.1], [0, 0, 0, 1]])
+
+
+@pytest.mark.parametrize(
+    "kernel",
+    [
+        gn.SquaredExponential([0.5, 0.3, 0.9]),
+        gn.Matern(1.5, 0.5),
+        gn.RationalQuadratic(1, [0.4, np.inf, 0.6]),
+        gn.LocallyPeriodic(0.8, 0.5, [0, 0, 1], 1.0),
+        0.3 * gn.SquaredExponential(0.4) + gn.Wong(0.3),
+    ],
+)
+def test_a_moved_process_is_the_process_elsewhere(kernel, seed):
+    """Definitions B12: f at x is that at M⁻¹x, with its covariance, slopes and first hits."""
+    box = ((-2, -2, -2), (2, 2, 2))
+    gp = gn.GaussianProcess(
+        gn.SphereField([0.2, 0, 0], 0.8),
+        (0.1 + 0.05 * gn.PlaneField([0, 0, 0], [0, 1, 0])).clamped(0.02, 0.3),
+        kernel,
+        bounds=box,
+    )
+    moved = gp.transformed(MOVED)
+    rng = np.random.default_rng(seed)
+    points = rng.normal(size=(6, 3))
+    there = points @ MOVED[:3, :3].T + MOVED[:3, 3]
+    np.testing.assert_allclose(moved.mean(there), gp.mean(points), atol=1e-12)
+    np.testing.assert_allclose(moved.covariance(there, there), gp.covariance(points, points), atol=1e-12)
+    inverse = np.linalg.inv(MOVED[:3, :3])
+    joint = gp.joint_covariance(points, points)[..., 1:, 1:]
+    np.testing.assert_allclose(
+        moved.joint_covariance(there, there)[..., 1:, 1:], np.einsum("ai,pqab,bj->pqij", inverse, joint, inverse), atol=1e-9
+    )
+    # Rays of the same parameter meet it at the same parameter, in distribution.
+    n = 3000
+    origins, directions = np.tile([-3.0, 0.1, 0.2], (n, 1)), np.tile([1.0, 0, 0], (n, 1))
+    along = directions @ MOVED[:3, :3].T
+    speed = np.linalg.norm(along[0])
+    here = gn.first_hits(gp, origins, directions, 6, seed=seed)
+    hits = gn.first_hits(moved, origins @ MOVED[:3, :3].T + MOVED[:3, 3], along / speed, 6 * speed, seed=seed + 1)
+    check_same_distribution(hits["t"] / speed, here["t"], "t")
+    for axis in range(3):
+        hit, met = np.isfinite(here["t"]), np.isfinite(hits["t"])
+        gradient = here["gradient"][hit] @ inverse
+        check_same_distribution(hits["gradient"][met, axis], gradient[:, axis], f"gradient {axis}")
+
+
+def test_operands_with_transforms_of_their_own(seed):
+    """A tree that is moved as a whole is the tree of its moved leaves; moved there and back it shares its noise again."""
+    s, t = (leaf.process for leaf in SAME)
+    back = s.transformed(MOVED).transformed(np.linalg.inv(MOVED))
+    shared = gn.union(back, t, shared_noise=True)
+    assert not np.isfinite(gn.first_hits(gn.difference(s, s, shared_noise=True), *rays(500), 4)["t"]).any()
+    whole = gn.union(s, t, shared_noise=True).transformed(MOVED)
+    assert repr(whole) == repr(shared)
+    points = np.random.default_rng(seed).normal(size=(5, 3))
+    there = points @ MOVED[:3, :3].T + MOVED[:3, 3]
+    for leaf, original in zip(whole.leaves, (s, t), strict=True):
+        np.testing.assert_allclose(leaf.covariance(there, there), original.covariance(points, points), atol=1e-12)
+    with pytest.raises(ValueError, match="must not flatten space"):
+        s.transformed(np.diag([1, 0, 1, 1]))
+    turned = np.eye(4)
+    turned[:2, :2] = [[0, -1], [1, 0]]
+    stretched = gn.GaussianProcess(0, 1, gn.SquaredExponential([1, 2, 3]))
+    with pytest.raises(ValueError, match="takes operands of one kernel"):
+        gn.union(stretched, stretched.transformed(turned), shared_noise=True)
+
+
 def test_two_spheres_of_the_paper(n, seed):
     """Issue 5's scene: a rough sphere and an almost certain one; parts by explicit realisations elsewhere."""
     large = gn.GaussianProcess(gn.SphereField([-0.4, 0.8, 0], 0.8), 0.1, gn.SquaredExponential(0.5))
