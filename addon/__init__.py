@@ -1,8 +1,8 @@
 """GPIS: a render engine for stochastic implicit surfaces (Seyb et al. 2024)."""
 
-from . import bake, engine, paint, presets, ui, viewport
+from . import bake, csg, engine, paint, presets, ui, viewport
 
-_PARTS = (ui, bake, presets, paint, viewport, engine)
+_PARTS = (ui, bake, csg, presets, paint, viewport, engine)
 
 
 def register():

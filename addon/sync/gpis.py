@@ -5,7 +5,7 @@ import numpy as np
 from .. import volume
 from ..native import native
 from ..paint import conditions
-from . import kernel, materials
+from . import csg, kernel, materials
 from .kernel import check_positive
 from .state import SyncError, array
 
@@ -22,23 +22,32 @@ def add(sync, obj, matrix_world):
     scale = np.linalg.norm(matrix[:3, :3], axis=0)
     if abs(np.linalg.det(matrix[:3, :3])) <= 1e-12 * max(scale.max(), 1e-30) ** 3:
         raise SyncError(f"{owner} is scaled to zero along an axis (scale {_words(scale)}): clear its scale.")
-    process = process_of(sync, obj)
-    names = materials.of_object(sync, obj)
-    if len(names) > 1:
-        sync.warn(f"{owner} has {len(names)} material slots: the first is its micro-BRDF, the others are not used.")
+    composed = composed_of(sync, obj)
+    slots = len(materials.of_object(sync, obj))
+    if slots > 1:
+        sync.warn(f"{owner} has {slots} material slots: the first is its micro-BRDF, the others are not used.")
     entry = {} if not obj.gpis.use_albedo else {"albedo": _albedo(owner, obj)}
     sync.description["objects"].append(
         entry
         | {
             "name": obj.name,
             "type": "gpis",
-            "process": process,
+            "process": composed.process,
             "matrix": matrix,
-            "materials": names[:1],
+            "materials": composed.materials,
             "memory": obj.gpis.memory.lower().replace("_plus", "+"),
             "sampler": obj.gpis.sampler.lower(),
         }
     )
+
+
+def composed_of(sync, obj, blends=False):
+    """The object with the operands of its CSG list, as a sync.csg.Composed in its own space."""
+
+    def process_and_bounds(one):
+        return process_of(sync, one), bounds_of(one)
+
+    return csg.compose(sync, f'GPIS object "{obj.name}"', obj, array(obj.matrix_world), process_and_bounds, blends=blends)
 
 
 def process_of(sync, obj):

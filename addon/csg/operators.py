@@ -1,0 +1,137 @@
+"""Operators of the list of operands."""
+
+import bpy
+from bpy.props import EnumProperty
+
+from .properties import OPERATIONS
+
+
+def lists_with(obj):
+    """Objects in whose list `obj` is."""
+    return [other for other in bpy.data.objects if any(item.object == obj for item in other.gpis_csg.items)]
+
+
+def reaches(obj, target):
+    """Whether `target` is `obj` or somewhere in its list, or in those of its operands."""
+    seen, waiting = set(), [obj]
+    while waiting:
+        one = waiting.pop()
+        if one == target:
+            return True
+        if one.name_full not in seen:
+            seen.add(one.name_full)
+            waiting.extend(item.object for item in one.gpis_csg.items if item.object is not None)
+    return False
+
+
+def release(obj):
+    """An operand of no list any more is rendered by itself again."""
+    if obj is not None and not lists_with(obj):
+        obj.hide_render = False
+
+
+class _ListOperator:
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        obj = context.object
+        if obj is None or obj.type != "VOLUME" or not obj.gpis.enabled:
+            cls.poll_message_set("Make a GPIS the active object first")
+            return False
+        return True
+
+
+class GPIS_OT_csg_add(_ListOperator, bpy.types.Operator):
+    """Add the selected GPIS objects to the list of the active one. They are drawn as bounds, and no longer rendered by
+    themselves"""
+
+    bl_idname = "gpis.csg_add"
+    bl_label = "Add Operands"
+
+    operation: EnumProperty(name="Operation", items=OPERATIONS, default="UNION")
+
+    def execute(self, context):
+        obj = context.object
+        settings = obj.gpis_csg
+        present = {item.object for item in settings.items}
+        operands = [other for other in context.selected_objects if other != obj and other.type == "VOLUME" and other.gpis.enabled]
+        for operand in operands:
+            if reaches(operand, obj):
+                self.report(
+                    {"ERROR"}, f'"{operand.name}" has "{obj.name}" in its own list: they cannot be operands of each other.'
+                )
+                return {"CANCELLED"}
+        new = [operand for operand in operands if operand not in present]
+        if operands and not new:
+            self.report({"ERROR"}, "All selected GPIS objects are in the list already.")
+            return {"CANCELLED"}
+        for operand in new or [None]:  # an empty line, to choose the operand in
+            item = settings.items.add()
+            item.operation = self.operation
+            if operand is not None:
+                item.object = operand
+                operand.display_type = "BOUNDS"
+                operand.hide_render = True
+        settings.active = len(settings.items) - 1
+        obj.update_tag()
+        return {"FINISHED"}
+
+
+class GPIS_OT_csg_remove(_ListOperator, bpy.types.Operator):
+    """Take the active operand off the list. It is rendered by itself again"""
+
+    bl_idname = "gpis.csg_remove"
+    bl_label = "Remove Operand"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and len(context.object.gpis_csg.items) > 0
+
+    def execute(self, context):
+        settings = context.object.gpis_csg
+        index = min(settings.active, len(settings.items) - 1)
+        operand = settings.items[index].object
+        settings.items.remove(index)
+        settings.active = max(0, min(index, len(settings.items) - 1))
+        release(operand)
+        context.object.update_tag()
+        return {"FINISHED"}
+
+
+class GPIS_OT_csg_move(_ListOperator, bpy.types.Operator):
+    """Move the active operand in the list: operations are carried out from top to bottom"""
+
+    bl_idname = "gpis.csg_move"
+    bl_label = "Move Operand"
+
+    direction: EnumProperty(
+        name="Direction", items=(("UP", "Up", "Earlier"), ("DOWN", "Down", "Later")), default="UP", options={"SKIP_SAVE"}
+    )
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and len(context.object.gpis_csg.items) > 1
+
+    def execute(self, context):
+        settings = context.object.gpis_csg
+        to = settings.active + (-1 if self.direction == "UP" else 1)
+        if not 0 <= to < len(settings.items):
+            return {"CANCELLED"}
+        settings.items.move(settings.active, to)
+        settings.active = to
+        context.object.update_tag()
+        return {"FINISHED"}
+
+
+_CLASSES = (GPIS_OT_csg_add, GPIS_OT_csg_remove, GPIS_OT_csg_move)
+
+
+def register():
+    for cls in _CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister():
+    for cls in reversed(_CLASSES):
+        bpy.utils.unregister_class(cls)

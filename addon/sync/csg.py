@@ -1,0 +1,88 @@
+"""The list of operands of a GPIS object -> one CSG tree in the space of that object, with a material for each leaf."""
+
+import numpy as np
+
+from ..native import native
+from . import materials
+from .state import SyncError, array
+
+
+def used(settings):
+    """The items that count: those that are enabled, or of them those that are solo."""
+    items = [item for item in settings.items if item.enabled]
+    return [item for item in items if item.solo] or items
+
+
+class Composed:
+    """A process or tree, the names of its leaves' materials, and the box around it (min, max)."""
+
+    def __init__(self, process, material_names, bounds):
+        self.process, self.materials, self.bounds = process, material_names, bounds
+
+
+def compose(sync, owner, obj, matrix, process_of, *, blends=False, above=()):
+    """The object with its operands. `process_of(obj)` gives (process, bounds) of one object without its list; `blends`:
+    smooth unions are wanted, for a fit. `above`: names of the objects whose operand this is."""
+    process, bounds = process_of(obj)
+    result = Composed(process, materials.of_object(sync, obj)[:1], bounds)
+    settings = obj.gpis_csg
+    shared = settings.correlation == "SHARED"
+    for item in used(settings):
+        if item.object is None:
+            raise SyncError(f"{owner}: its CSG list has a line without an operand: choose one, or remove the line.")
+        if item.object.original.name_full in (*above, obj.name_full):
+            raise SyncError(
+                f'{owner}: its CSG list leads back to itself by "{item.object.name}": remove it from one of the lists.'
+            )
+        operand = _operand(sync, owner, obj, matrix, item, process_of, blends, above)
+        result = _combine(owner, result, operand, item, shared, blends)
+    return result
+
+
+def _operand(sync, owner, obj, matrix, item, process_of, blends, above):
+    evaluated = item.object.evaluated_get(sync.depsgraph)
+    if evaluated.type != "VOLUME" or not evaluated.gpis.enabled:
+        raise SyncError(f'{owner}: the operand "{evaluated.name}" of its CSG list is no GPIS: switch GPIS on, or remove it.')
+    placed = array(evaluated.matrix_world)
+    if abs(np.linalg.det(placed[:3, :3])) <= 1e-12 * max(np.linalg.norm(placed[:3, :3], axis=0).max(), 1e-30) ** 3:
+        raise SyncError(f'{owner}: the operand "{evaluated.name}" is scaled to zero along an axis: clear its scale.')
+    operand = compose(sync, owner, evaluated, placed, process_of, blends=blends, above=(*above, obj.name_full))
+    to_object = np.linalg.inv(matrix) @ placed
+    to_object[3] = (0, 0, 0, 1)
+    if not np.allclose(to_object, np.eye(4), rtol=0, atol=1e-12):
+        operand.process = operand.process.transformed(to_object)
+        operand.bounds = _moved(operand.bounds, to_object)
+    return operand
+
+
+def _combine(owner, a, b, item, shared, blends):
+    gn = native()
+    names = a.materials + b.materials
+    around = tuple(np.minimum(a.bounds[0], b.bounds[0])), tuple(np.maximum(a.bounds[1], b.bounds[1]))
+    try:
+        if item.operation == "UNION":
+            return Composed(gn.union(a.process, b.process, shared_noise=shared), names, around)
+        if item.operation == "SMOOTH_UNION":
+            if not blends:
+                raise SyncError(
+                    f'{owner}: its CSG list has "{item.object.name}" as a Smooth Union, which is not rendered live: fit it '
+                    "(Object properties, GPIS, CSG) and render the fit, or choose Union."
+                )
+            tree = gn.smooth_union(a.process, b.process, blend=item.blend, shared_noise=shared)
+            return Composed(tree, names, around)
+        if item.operation == "DIFFERENCE":
+            return Composed(gn.difference(a.process, b.process, shared_noise=shared), names, a.bounds)
+        inside = tuple(np.maximum(a.bounds[0], b.bounds[0])), tuple(np.minimum(a.bounds[1], b.bounds[1]))
+        if any(low >= high for low, high in zip(*inside, strict=True)):
+            raise SyncError(f'{owner}: its bounds and those of "{item.object.name}" do not meet: the intersection is empty.')
+        return Composed(gn.intersection(a.process, b.process, shared_noise=shared), names, inside)
+    except ValueError as error:
+        if isinstance(error, SyncError):
+            raise
+        raise SyncError(f'{owner}: operand "{item.object.name}": {error}') from error
+
+
+def _moved(bounds, matrix):
+    corners = np.array([[bounds[i >> axis & 1][axis] for axis in range(3)] for i in range(8)])
+    corners = corners @ matrix[:3, :3].T + matrix[:3, 3]
+    return tuple(corners.min(axis=0)), tuple(corners.max(axis=0))

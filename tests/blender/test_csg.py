@@ -1,0 +1,216 @@
+"""CSG lists of GPIS objects: what they are in the description, how they are edited, and the fit."""
+
+import importlib
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+
+from . import support
+
+
+def add_gpis(scene, name, location, radius, color=(0.8, 0.8, 0.8), sigma=0.05, **placed):
+    """A GPIS of a sphere, without a mesh: a small grid of its distance."""
+    gn = importlib.import_module("gpis_native")
+    n, side = 25, 1.6 * radius
+    x = np.linspace(-side, side, n)
+    distance = np.sqrt(x[:, None, None] ** 2 + x[:, None] ** 2 + x**2) - radius
+    path = f"{bpy.app.tempdir}/{name}.vdb"
+    gn.write_vdb(path, {"mean": distance, "origin": (-side,) * 3, "voxel_size": x[1] - x[0]})
+    data = bpy.data.volumes.new(name)
+    data.filepath = path
+    data.materials.append(support.diffuse(f"{name} Material", color))
+    obj = support.link(scene, name, data, location=location, **placed)
+    obj.gpis.enabled = True
+    obj.gpis.sigma, obj.gpis.length_scale = sigma, 0.4
+    return obj
+
+
+@pytest.fixture
+def operands(stage):
+    """A base of radius 1 and two smaller ones, b turned and stretched; the base is active, all are selected."""
+    a = add_gpis(stage, "A", (0, 0, 0), 1.0, (1, 0, 0))
+    b = add_gpis(stage, "B", (0.9, 0, 0), 0.6, (0, 1, 0), rotation=(1, 0.2, 0.4, 0), scale=(1, 1.3, 0.7))
+    c = add_gpis(stage, "C", (0, -0.9, 0), 0.5, (0, 0, 1))
+    for obj in (a, b, c):
+        obj.select_set(True)
+    bpy.context.view_layer.objects.active = a
+    bpy.context.view_layer.update()
+    return a, b, c
+
+
+def build(a, operations):
+    assert bpy.ops.gpis.csg_add() == {"FINISHED"}
+    for item, operation in zip(a.gpis_csg.items, operations, strict=True):
+        item.operation = operation
+
+
+def entry_of(describe):
+    entries, warnings = describe()
+    (entry,) = (entry for entry in entries if not bpy.data.objects[entry["name"]].hide_render)
+    return entry, warnings
+
+
+def test_add_selected(operands, describe):
+    a, b, c = operands
+    build(a, ["UNION", "DIFFERENCE"])
+    assert {item.object for item in a.gpis_csg.items} == {b, c}
+    for operand in (b, c):
+        assert operand.display_type == "BOUNDS" and operand.hide_render
+    entry, _ = entry_of(describe)  # the operands are no longer objects of their own
+    assert entry["name"] == "A"
+    order = [item.object.name for item in a.gpis_csg.items]
+    assert entry["materials"] == ["A Material", *(f"{name} Material" for name in order)]
+    assert repr(entry["process"]) == "<ProcessTree intersection(union(0, 1), complement(2))>"
+    bpy.ops.gpis.csg_remove()
+    assert len(a.gpis_csg.items) == 1
+    freed = b if a.gpis_csg.items[0].object == c else c
+    assert not freed.hide_render
+
+
+def test_operands_keep_their_places(operands, describe):
+    """Each leaf at a point of the base's space is the operand at that point of the world, animation and all."""
+    a, b, c = operands
+    build(a, ["UNION", "UNION"])
+    a.matrix_world = Matrix.LocRotScale((0.3, 0.2, 0), None, (1.5, 1, 1))
+    c.location = (0, 0, 0)
+    c.keyframe_insert("location", frame=1)
+    c.location = (0, 0, 2)
+    c.keyframe_insert("location", frame=11)
+    points = np.random.default_rng(1).uniform(-0.5, 0.5, (20, 3))
+    for frame in (1, 11):
+        bpy.context.scene.frame_set(frame)
+        leaves = entry_of(describe)[0]["process"].leaves
+        for leaf, obj in zip(leaves, [a] + [item.object for item in a.gpis_csg.items], strict=True):
+            radius = {"A": 1.0, "B": 0.6, "C": 0.5}[obj.name]
+            depsgraph = bpy.context.evaluated_depsgraph_get()
+            to_operand = np.linalg.inv(np.array(obj.evaluated_get(depsgraph).matrix_world)) @ np.array(a.matrix_world)
+            there = points @ to_operand[:3, :3].T + to_operand[:3, 3]
+            near = np.abs(there).max(axis=1) < 1.5 * radius
+            expected = np.linalg.norm(there, axis=1) - radius
+            assert near.any() or (obj == c and frame == 11)
+            assert np.allclose(leaf.mean(points)[near], expected[near], atol=0.02), (obj.name, frame)
+
+
+def test_order_toggle_solo(operands, describe):
+    a, b, c = operands
+    build(a, ["UNION", "DIFFERENCE"])
+    items = a.gpis_csg.items
+    a.gpis_csg.active = 1
+    second = items[1].object
+    assert bpy.ops.gpis.csg_move(direction="UP") == {"FINISHED"}
+    assert items[0].object == second and a.gpis_csg.active == 0
+    assert repr(entry_of(describe)[0]["process"]) == "<ProcessTree union(intersection(0, complement(1)), 2)>"
+    assert bpy.ops.gpis.csg_move(direction="UP") == {"CANCELLED"}
+    items[0].enabled = False
+    assert repr(entry_of(describe)[0]["process"]) == "<ProcessTree union(0, 1)>"
+    items[0].enabled = True
+    items[0].solo = True
+    assert repr(entry_of(describe)[0]["process"]) == "<ProcessTree intersection(0, complement(1))>"
+    items[0].enabled = False
+    items[1].enabled = False
+    assert "GaussianProcess" in repr(entry_of(describe)[0]["process"])
+
+
+def test_lists_nest(operands, describe):
+    a, b, c = operands
+    b.gpis_csg.items.add().object = c
+    b.gpis_csg.items[0].operation = "INTERSECTION"
+    a.gpis_csg.items.add().object = b
+    a.gpis_csg.items[0].operation = "DIFFERENCE"
+    b.hide_render = c.hide_render = True
+    entry, _ = entry_of(describe)
+    assert repr(entry["process"]) == "<ProcessTree intersection(0, union(complement(1), complement(2)))>"
+    assert entry["materials"] == ["A Material", "B Material", "C Material"]
+    bpy.context.view_layer.objects.active = c
+    with pytest.raises(RuntimeError, match="cannot be operands of each other"):
+        bpy.ops.gpis.csg_add()
+
+
+def test_shared_noise(operands, describe):
+    a, b, c = operands
+    a.gpis_csg.items.add().object = c
+    a.gpis_csg.correlation = "SHARED"
+    b.hide_render = c.hide_render = True
+    assert entry_of(describe)[0]["process"].plan()["composition"].endswith("shared by some leaves")
+    c.gpis.length_scale = 0.3
+    with pytest.raises(
+        ValueError, match='GPIS object "A": operand "C": union with shared_noise=True takes operands of one kernel'
+    ):
+        describe()
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (lambda a, b, c: setattr(a.gpis_csg.items[0], "object", None), "has a line without an operand"),
+        (lambda a, b, c: setattr(b.gpis, "enabled", False), 'operand "B" of its CSG list is no GPIS'),
+        (lambda a, b, c: setattr(b.gpis_csg.items.add(), "object", a), "leads back to itself"),
+        (lambda a, b, c: setattr(b, "scale", (1, 0, 1)), '"B" is scaled to zero along an axis'),
+        (lambda a, b, c: setattr(a.gpis_csg.items[0], "operation", "SMOOTH_UNION"), "not rendered live: fit it"),
+        (
+            lambda a, b, c: (setattr(a.gpis_csg.items[0], "operation", "INTERSECTION"), setattr(b, "location", (9, 0, 0))),
+            "the intersection is empty",
+        ),
+    ],
+)
+def test_sentences(operands, describe, change, sentence):
+    a, b, c = operands
+    a.gpis_csg.items.add().object = b
+    b.hide_render = c.hide_render = True
+    change(a, b, c)
+    with pytest.raises(ValueError, match=f'GPIS object "A": .*{sentence}'):
+        describe()
+
+
+def test_fit(operands, describe, tmp_path):
+    """A new Volume with the moments of the composition, that renders like it."""
+    a, b, c = operands
+    build(a, ["UNION", "UNION"])
+    live, _ = entry_of(describe)
+    live_picture = support.picture(bpy.context.scene, tmp_path)
+    assert bpy.ops.gpis.csg_fit(resolution=24, realisations=200, seed=3) == {"FINISHED"}
+    fitted = bpy.context.object
+    assert fitted.name == "A Fit" and fitted.type == "VOLUME" and fitted.display_type == "BOUNDS"
+    assert a.hide_render and not fitted.hide_render
+    assert fitted.data.gpis_baked and fitted.material_slots[0].material == a.material_slots[0].material
+    assert "realisations: standard error of the mean" in fitted.gpis_csg.quality
+    assert "Kolmogorov distance" in fitted.gpis_csg.quality
+    entry, warnings = entry_of(describe)
+    assert not warnings
+    points = np.random.default_rng(1).uniform(-1, 1, (50, 3))
+    values = np.stack([leaf.mean(points) for leaf in live["process"].leaves], axis=-1)
+    # Where one operand wins the mean is its own, between the voxels to their size.
+    other = np.sort(values, axis=1)
+    clear = other[:, 1] - other[:, 0] > 0.4
+    assert clear.sum() > 10
+    assert np.allclose(entry["process"].mean(points)[clear], other[clear, 0], atol=0.05)
+    assert np.all(np.abs(live_picture - support.picture(bpy.context.scene, tmp_path, seed=1)).mean() < 0.2)
+
+
+def test_fit_of_a_smooth_union_in_closed_form_is_refused(operands):
+    a, b, c = operands
+    build(a, ["SMOOTH_UNION", "UNION"])
+    a.gpis_csg.items[0].blend = 0.3
+    before = len(bpy.data.objects)
+    with pytest.raises(RuntimeError, match="takes hard unions, intersections and differences"):
+        bpy.ops.gpis.csg_fit(resolution=16, method="CLOSED_FORM")
+    assert len(bpy.data.objects) == before and not a.hide_render
+    assert bpy.ops.gpis.csg_fit(resolution=16, realisations=50) == {"FINISHED"}
+    assert bpy.ops.gpis.csg_fit.poll() is False  # the fit has no list
+
+
+def test_progress_and_cancelling(operands, extension):
+    """The work that the window's modal operator watches: in a thread, told to stop."""
+    a, b, c = operands
+    build(a, ["UNION", "UNION"])
+    module = importlib.import_module(extension + ".csg.fit")
+    query = module._Query(bpy.context, a, resolution=96, realisations=1_000_000, method="SAMPLE")
+    plan = query.plan()
+    assert plan["seconds"] > 1 and 0 < plan["voxels_drawn"] < plan["voxels"] and plan["memory"] > 0
+    work = module._Work(query, 1)
+    assert work.running()
+    work.cancel()
+    work.join()
+    assert work.result is None and work.error is None and work.fraction < 1
