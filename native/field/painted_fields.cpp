@@ -179,14 +179,23 @@ PaintCounts PaintedFields::reset(Channel channel) {
   const PaintLayers& layers = impl_->layers;
   return with_layer(layers, channel, [&](const auto& layer) {
     using Kind = typename std::decay_t<decltype(layer)>::Kind;
-    const auto leaves = leaves_of<Kind>(*layer.base[0]);
-    return rewrite<Kind>(layers, layer, leaves, [&] {
+    PaintCounts counts = rewrite<Kind>(layers, layer, leaves_of<Kind>(*layer.base[0]), [&] {
       return [&, base = LayerReader<Kind>(layer.base, layers.box)](
                  const openvdb::Coord& c, const Vec3&, const typename Kind::Value& old,
-                 PaintCounts&) -> std::optional<typename Kind::Value> {
-        return taken(channel, old, base.at(c));
-      };
+                 PaintCounts&) { return std::optional(taken(channel, old, base.at(c))); };
     });
+    if (channel == Channel::mean) return counts;  // extended by its own rule
+    // What the grid was extended from has changed.
+    std::vector<openvdb::Coord> extended;
+    for (const openvdb::Coord& c : leaves_of_box(layers.box))
+      if (!layers.base_box.isInside(openvdb::CoordBBox(c, c.offsetBy(7)))) extended.push_back(c);
+    const auto again = [&] {
+      return [&, now = LayerReader<Kind>(layer.grid, layers.base_box)](
+                 const openvdb::Coord& c, const Vec3&, const typename Kind::Value& old,
+                 PaintCounts&) { return std::optional(taken(channel, old, now.at(c))); };
+    };
+    counts.add(rewrite<Kind>(layers, layer, extended, again, Rewrite::extend));
+    return counts;
   });
 }
 
@@ -259,12 +268,6 @@ void PaintedFields::resample(double voxel_size) {
     if (std::abs(std::abs(old.to_object.linear.row[i][i]) - edges[i]) > 1e-6 * edges[i])
       refuse("The grid is rotated or sheared in its file; only one along the axes is resampled.");
   const Box3 bounds = this->bounds();
-  PaintLayers next = old;
-  next.transform = openvdb::math::Transform::createLinearTransform(voxel_size);
-  next.transform->postTranslate(openvdb::Vec3d(bounds.min.x, bounds.min.y, bounds.min.z));
-  next.to_object = {Mat3{} * voxel_size, bounds.min};
-  next.to_index = inverse(next.to_object);
-  next.gradient_to_object = transpose(next.to_index.linear);
   openvdb::Coord last;
   for (int i = 0; i < 3; ++i) {
     // A box that is a whole number of voxels but for rounding is not one more.
@@ -274,6 +277,12 @@ void PaintedFields::resample(double voxel_size) {
              ".");
     last[i] = static_cast<int>(cells);
   }
+  PaintLayers next = old;
+  next.transform = openvdb::math::Transform::createLinearTransform(voxel_size);
+  next.transform->postTranslate(openvdb::Vec3d(bounds.min.x, bounds.min.y, bounds.min.z));
+  next.to_object = {Mat3{} * voxel_size, bounds.min};
+  next.to_index = inverse(next.to_object);
+  next.gradient_to_object = transpose(next.to_index.linear);
   next.box = next.base_box = {openvdb::Coord(0, 0, 0), last};
   check_nodes(next.box);
 
