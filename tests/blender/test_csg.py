@@ -164,12 +164,11 @@ def test_sentences(operands, describe, change, sentence):
         describe()
 
 
-def test_fit(operands, describe, tmp_path):
-    """A new Volume with the moments of the composition, that renders like it."""
+def test_fit(operands, describe):
+    """A new Volume with the moments of the composition."""
     a, b, c = operands
     build(a, ["UNION", "UNION"])
     live, _ = entry_of(describe)
-    live_picture = support.picture(bpy.context.scene, tmp_path)
     assert bpy.ops.gpis.csg_fit(resolution=24, realisations=200, seed=3) == {"FINISHED"}
     fitted = bpy.context.object
     assert fitted.name == "A Fit" and fitted.type == "VOLUME" and fitted.display_type == "BOUNDS"
@@ -186,7 +185,6 @@ def test_fit(operands, describe, tmp_path):
     clear = other[:, 1] - other[:, 0] > 0.4
     assert clear.sum() > 10
     assert np.allclose(entry["process"].mean(points)[clear], other[clear, 0], atol=0.05)
-    assert np.all(np.abs(live_picture - support.picture(bpy.context.scene, tmp_path, seed=1)).mean() < 0.2)
 
 
 def test_fit_of_a_smooth_union_in_closed_form_is_refused(operands):
