@@ -45,7 +45,7 @@ def test_disable_leaves_nothing_behind(disabled, extension):
     assert any("GPIS" in names for names in with_engines.values())
     assert not any("GPIS" in names for names in engines.values())
     for owner, names in with_properties.items():
-        assert {name for name in names - properties[owner]} in ({"gpis"}, {"gpis_baked", "gpis_strokes"})
+        assert {name for name in names - properties[owner]} in ({"gpis"}, {"gpis", "gpis_csg"}, {"gpis_baked", "gpis_strokes"})
 
 
 def test_enabled_again_it_works(disabled, extension, tmp_path):
