@@ -192,23 +192,29 @@ void TileWorker::draw(int realisation) {
   }
 }
 
+std::size_t TileWorker::drawn_at(const Node& s) const {
+  return (static_cast<std::size_t>(s.offset[0] - box_first_[0]) * box_size_[1] + s.offset[1] -
+          box_first_[1]) *
+             box_size_[2] +
+         s.offset[2] - box_first_[2];
+}
+
+double TileWorker::drawn_value(const LeafAt& leaf, int number, std::size_t at) const {
+  if (!(used_ >> number & 1)) return leaf.mean;
+  const Mixture& m = composition_.mixture(number);
+  double g = 0;
+  if (m.common != 0) g += m.common * noise_[0][at];
+  if (m.own != 0) g += m.own * noise_[1 + composition_.tree().leaves()[number].noise][at];
+  return leaf.mean + leaf.deviation * g;
+}
+
 void TileWorker::add() {
   const ProcessTree& tree = composition_.tree();
   const int count = composition_.leaves();
   const LeafAt* leaf = leaves_.data();
   for (Node& s : sampled_) {
-    const std::size_t at = (static_cast<std::size_t>(s.offset[0] - box_first_[0]) * box_size_[1] +
-                            s.offset[1] - box_first_[1]) *
-                               box_size_[2] +
-                           s.offset[2] - box_first_[2];
-    const auto value = [&](int l) {
-      if (!(used_ >> l & 1)) return leaf[l].mean;
-      const Mixture& m = composition_.mixture(l);
-      double g = 0;
-      if (m.common != 0) g += m.common * noise_[0][at];
-      if (m.own != 0) g += m.own * noise_[1 + tree.leaves()[l].noise][at];
-      return leaf[l].mean + leaf[l].deviation * g;
-    };
+    const std::size_t at = drawn_at(s);
+    const auto value = [&](int l) { return drawn_value(leaf[l], l, at); };
     const ProcessTree::Winner winner = tree.winner(tree.root(), value);
     const LeafAt& won = leaf[winner.leaf];
     s.moments.add(winner.value, won.gradient + won.per_value * (winner.value - won.mean),
@@ -222,19 +228,8 @@ void TileWorker::add_smooth() {
   const int count = composition_.leaves();
   const LeafAt* leaf = leaves_.data();
   for (Node& s : sampled_) {
-    const std::size_t at = (static_cast<std::size_t>(s.offset[0] - box_first_[0]) * box_size_[1] +
-                            s.offset[1] - box_first_[1]) *
-                               box_size_[2] +
-                           s.offset[2] - box_first_[2];
-    for (int l = 0; l < count; ++l) {
-      const Mixture& m = composition_.mixture(l);
-      double g = 0;
-      if (used_ >> l & 1) {
-        if (m.common != 0) g += m.common * noise_[0][at];
-        if (m.own != 0) g += m.own * noise_[1 + tree.leaves()[l].noise][at];
-      }
-      values_[l] = leaf[l].mean + leaf[l].deviation * g;
-    }
+    const std::size_t at = drawn_at(s);
+    for (int l = 0; l < count; ++l) values_[l] = drawn_value(leaf[l], l, at);
     const double f = tree.compose(values_.data(), weights_.data());
     // ∇F is the leaves' mixed by their weights; their noises may have something in common.
     Vec3 slope;

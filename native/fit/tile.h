@@ -47,6 +47,9 @@ class TileWorker {
   void prepare(Fit& fit, std::size_t node, const std::array<int, 3>& offset, const Vec3& x,
                const Composition::Alive& alive);
   void draw(int realisation);
+  // Where a node's values are in the box that was drawn, and the value of one of its leaves.
+  std::size_t drawn_at(const Node& s) const;
+  double drawn_value(const LeafAt& leaf, int number, std::size_t at) const;
   void add();
   void add_smooth();
 

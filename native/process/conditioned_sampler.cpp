@@ -25,6 +25,7 @@ class ConditionedSampler final : public LineSampler {
     return std::make_unique<Noise>(*this, line);
   }
   double condition_pull() const override { return near_->condition_pull(); }
+  double reach() const override { return std::min(near_->reach(), far_->reach()); }
   double correlation_error() const override {
     return std::max(near_->correlation_error(), far_->correlation_error());
   }

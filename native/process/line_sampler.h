@@ -29,6 +29,8 @@ class LineSampler {
   // g given the conditions; null where there are none. How far they may hold its mean from 0.
   virtual std::shared_ptr<const Posterior> posterior() const { return nullptr; }
   virtual double condition_pull() const { return 0; }
+  // Length scales of a line within which that bound holds.
+  virtual double reach() const { return kInfinity; }
   // Bound on |implied - exact correlation| of the path.
   virtual double correlation_error() const = 0;
 };

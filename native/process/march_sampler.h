@@ -54,6 +54,11 @@ class MarchSampler final : public LineSampler {
     return 0;
   }
 
+  double reach() const override {
+    if constexpr (requires { plan_.reach; }) return plan_.reach;
+    return kInfinity;
+  }
+
   double correlation_error() const override { return plan_.correlation_error; }
 
  private:

@@ -35,6 +35,8 @@ class SpectralPath {
     std::vector<Table> tables;
     double variance = 0;
     double correlation_error = 0;
+    // Length scales after which a line comes to repeat itself; infinite where none is longer.
+    double reach = kInfinity;
   };
 
   void reset(const Plan& plan, const LineGeometry& line, double anchor, double t_end,

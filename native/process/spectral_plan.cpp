@@ -6,7 +6,7 @@ namespace gpis {
 namespace {
 
 // Lines longer than the last table take it all the same: correlations at lags within its reach are
-// right on a line of any length. A constant needs one.
+// right on a line of any length, those beyond are not (the plan says so). A constant needs one.
 constexpr double kReaches[] = {8, 16, 32, 64, 128, 256};
 constexpr std::size_t kMostWaves = 1 << 17;
 constexpr double kNegligible = 1e-7;  // share of the variance of a term that is left out
@@ -62,6 +62,8 @@ SpectralPath::Plan::Plan(const std::vector<Term>& terms, const Box3& bounds) {
       table.push_back(line_spectrum(radials[i], reach));
       if (reach >= longest[i] || radials[i].family == Radial::Family::constant) break;
     }
+    if (radials[i].family != Radial::Family::constant && table.back().reach < longest[i])
+      reach = std::min(reach, table.back().reach);
     tables.push_back(std::move(table));
   }
   for (const Component& c : components) {

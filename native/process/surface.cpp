@@ -249,6 +249,13 @@ std::vector<std::pair<std::string, std::string>> ProcessSurface::plan() const {
                      " time scales: a realisation (memory global, gp.realisation) flows "
                      "from frame to frame under one seed; the other memories draw "
                      "every path anew, whose expectation does not change with time"});
+  if (planned_->line_sampler->reach() < kInfinity)
+    facts.emplace_back(
+        "warning", "A ray that meets no surface for more than " +
+                       number(planned_->line_sampler->reach()) +
+                       " length scales comes to see the noise again that it has seen: how often "
+                       "such rays get through is off. Give the process smaller bounds, or take "
+                       "the sampler 'nystrom'.");
   if (planned_->steps > 1e5)
     facts.emplace_back("warning",
                        "A ray across the bounds may take " + number(planned_->steps) +

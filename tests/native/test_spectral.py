@@ -147,3 +147,13 @@ def test_refused(kernel, message):
     gp = gn.GaussianProcess(0, 1, kernel, bounds=BOUNDS)
     with pytest.raises(ValueError, match=message):
         gn.first_hits(gp, np.zeros((1, 3)), [[0.0, 0, 1]], 1, sampler="spectral")
+
+
+def test_the_plan_warns_of_lines_that_repeat_themselves():
+    """The tables end at 256 length scales: bounds that are longer, or none, are told; shorter ones are not."""
+    kernel = gn.RationalQuadratic(1.0, 0.1)
+    for side, warned in ((None, True), (40.0, True), (10.0, False)):
+        bounds = None if side is None else ([0, 0, 0], [side, 1, 1])
+        plan = gn.GaussianProcess(1.0, 0.5, kernel, bounds=bounds).plan()
+        assert plan["sampler"].startswith("spectral")
+        assert ("256 length scales" in plan.get("line_reach", "")) == warned
