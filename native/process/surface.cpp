@@ -251,11 +251,11 @@ std::vector<std::pair<std::string, std::string>> ProcessSurface::plan() const {
                      "every path anew, whose expectation does not change with time"});
   if (planned_->line_sampler->reach() < kInfinity)
     facts.emplace_back(
-        "warning", "A ray that meets no surface for more than " +
-                       number(planned_->line_sampler->reach()) +
-                       " length scales comes to see the noise again that it has seen: how often "
-                       "such rays get through is off. Give the process smaller bounds, or take "
-                       "the sampler 'nystrom'.");
+        "line_reach", "A ray that meets no surface for more than " +
+                          number(planned_->line_sampler->reach()) +
+                          " length scales comes to see the noise again that it has seen: how often "
+                          "such rays get through is off. Give the process smaller bounds, or take "
+                          "the sampler 'nystrom'.");
   if (planned_->steps > 1e5)
     facts.emplace_back("warning",
                        "A ray across the bounds may take " + number(planned_->steps) +
