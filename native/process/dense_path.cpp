@@ -69,16 +69,47 @@ DensePath::Plan::Halving halving(const Radial& radial, double h) {
   return out;
 }
 
-// Standard deviation of g from its cubic in the middle of an interval.
-double cubic_rest(const Radial& radial, double h) {
-  const Eigen::Vector4d w(0.5, h / 8, 0.5, -h / 8);
+// Covariance of (g, g') at both ends of an interval.
+Eigen::Matrix4d covariance_of_ends(const Radial& radial, double h) {
   Eigen::Matrix4d k;
-  Eigen::Vector4d c;
-  for (int i = 0; i < 2; ++i) {
+  for (int i = 0; i < 2; ++i)
     for (int j = 0; j < 2; ++j) k.block<2, 2>(2 * i, 2 * j) = block(radial, (i - j) * h);
-    c.segment<2>(2 * i) = block(radial, h / 2 - i * h).row(0).transpose();
+  return k;
+}
+
+// … and of g at a fraction s of the interval with them.
+Eigen::Vector4d covariance_with_ends(const Radial& radial, double h, double s) {
+  Eigen::Vector4d c;
+  for (int i = 0; i < 2; ++i) c.segment<2>(2 * i) = block(radial, (s - i) * h).row(0).transpose();
+  return c;
+}
+
+// The weights of (g, g') at both ends in the cubic through them.
+Eigen::Vector4d cubic(double h, double s) {
+  const double r = 1 - s;
+  return {r * r * (r + 3 * s), r * r * s * h, s * s * (s + 3 * r), -r * s * s * h};
+}
+
+// A cubic alone makes g'' a twelfth of h²g'''' too small, and as that is correlated with g'', its
+// variance h²/2 (SE) too large: 6% close to a start with known slope. The quintic cubic +
+// s²r²(α r + β s) that has the mean of g given both ends at s = ¼ and ¾ leaves h⁴/12. Rows α, β.
+Eigen::Matrix<double, 2, 4> bend_of_smooth(const Radial& radial, double h) {
+  const Eigen::FullPivLU<Eigen::Matrix4d> ends(covariance_of_ends(radial, h));
+  Eigen::Matrix2d terms;
+  Eigen::Matrix<double, 2, 4> missing;
+  for (int i = 0; i < 2; ++i) {
+    const double s = i == 0 ? 0.25 : 0.75, r = 1 - s;
+    terms.row(i) << s * s * r * r * r, s * s * r * r * s;
+    missing.row(i) = ends.solve(covariance_with_ends(radial, h, s)) - cubic(h, s);
   }
-  return std::sqrt(std::max(0.0, 1 - 2 * w.dot(c) + w.dot(k * w)));
+  return terms.inverse() * missing;
+}
+
+// Standard deviation of g from such a quintic in the middle of an interval, where it is largest.
+double rest_in_middle(const Radial& radial, double h, const Eigen::Matrix<double, 2, 4>& bend) {
+  const Eigen::Vector4d w = cubic(h, 0.5) + (bend.row(0) + bend.row(1)).transpose() / 32;
+  return std::sqrt(std::max(0.0, 1 - 2 * w.dot(covariance_with_ends(radial, h, 0.5)) +
+                                     w.dot(covariance_of_ends(radial, h) * w)));
 }
 
 }  // namespace
@@ -143,12 +174,21 @@ DensePath::Plan::Plan(const GaussianProcess& process, const Box3& bounds)
            " length scales across, these have ", lengths,
            ": give the process smaller bounds or take sampler 'auto'.");
   if (radial.smooth()) {
-    double rest = cubic_rest(radial, step);
-    while (rest > 1e-4 * 1.05 && step > 1e-3) rest = cubic_rest(radial, step /= 2);
+    double rest = 0;
+    for (step = 0.25;; step /= 2) {
+      bend = bend_of_smooth(radial, step);
+      rest = rest_in_middle(radial, step, bend);
+      if (rest <= 1e-4 || step < 1e-2) break;
+    }
     correlation_error = 2 * rest;
+    // |p - its cubic| <= max|p''''| h⁴/24 s²(1-s)², and s²(1-s)² <= (B₁+B₂)/12; p'''' is linear.
+    const Eigen::Vector4d fourth = (72 * bend.row(0) - 48 * bend.row(1)).transpose();
+    power = 4;
+    deviation = 4.5 / 288 * std::sqrt(fourth.dot(covariance_of_ends(radial, step) * fourth)) /
+                std::pow(step, power);
   } else {
     power = radial.family == Radial::Family::matern52 ? 2.5 : 1.5;
-    const double rest = cubic_rest(radial, step);
+    const double rest = rest_in_middle(radial, step, bend);
     // (B₁+B₂)(½) = ¾; 5% for what smaller intervals deviate more, relative to h^power.
     deviation = 4.5 * 1.05 * rest / 0.75 / std::pow(step, power);
     for (int i = 0; i < kHalvings; ++i) halvings.push_back(halving(radial, std::ldexp(step, -i)));
@@ -250,6 +290,12 @@ void DensePath::at(long cell, double t, Rng& rng, double& g, double& dg) {
   g = r * r * r * a.g + 3 * r * r * s * c1 + 3 * r * s * s * c2 + s * s * s * b.g;
   dg = 3 * (r * r * (c1 - a.g) + 2 * r * s * (c2 - c1) + s * s * (b.g - c2)) / h *
        line_.inverse_length();
+  if (!plan_->halvings.empty()) return;
+  // A smooth path is a quintic: s²r²(α r + β s) on top.
+  const Eigen::Vector2d bend = plan_->bend * Eigen::Vector4d(a.g, a.dg, b.g, b.dg);
+  const double top = bend[0] * r + bend[1] * s;
+  g += s * s * r * r * top;
+  dg += s * r * (2 * (r - s) * top + s * r * (bend[1] - bend[0])) / h * line_.inverse_length();
 }
 
 std::unique_ptr<LineSampler> make_dense(const GaussianProcess& process, const Box3& bounds) {

@@ -2,11 +2,11 @@
 // covariance, the reference for the other samplers; any one radial correlation with a derivative.
 // The points stand at a fixed spacing in units of the length scale, so the covariance is factorised
 // once per correlation, not per ray. Between two points
-//  - a smooth path is the cubic through both values and slopes: the spacing is chosen so that this
-//    leaves out less than 1e-4 standard deviations;
+//  - a smooth path is the quintic through both values and slopes that comes closest to the mean
+//    given them: the spacing is chosen so that this leaves out less than 1e-4 standard deviations;
 //  - a rough path (Matérn, Wong) is halved by its exact law given value and slope at both ends,
 //  down
-//    to kFinest of a cell, and cubic below. For Matérn 3/2 and Wong that law is the whole truth;
+//    to 1/256 of a cell, and cubic below. For Matérn 3/2 and Wong that law is the whole truth;
 //    Matérn 5/2 also knows g'' (its effect on the correlation is below the variance of the bridge).
 #pragma once
 
@@ -39,8 +39,10 @@ class DensePath {
     RadialLine::Plan line;
     double step = 0.25;               // of a cell, in length scales
     double reach = 0;                 // length scales that one joint sample covers
-    double deviation = 0, power = 0;  // of a rough path, see deviation()
-    std::vector<Halving> halvings;    // of a rough path: of a cell, of half a cell, …
+    double deviation = 0, power = 0;  // see deviation()
+    // Of a smooth path: what the quintic adds to the cubic, from both ends.
+    Eigen::Matrix<double, 2, 4> bend = Eigen::Matrix<double, 2, 4>::Zero();
+    std::vector<Halving> halvings;  // of a rough path: of a cell, of half a cell, …
     std::shared_ptr<DenseFactor> factor;
   };
 
@@ -61,8 +63,8 @@ class DensePath {
   void at_right(long, double& g, double& dg) const { read(nodes_.back(), g, dg); }
   void at(long cell, double t, Rng& rng, double& g, double& dg);
   double deviation(double h) const {
-    if (plan_->deviation == 0) return 0;
     const double q = h * line_.inverse_length();
+    if (plan_->power == 4) return plan_->deviation * (q * q) * (q * q);
     return plan_->deviation * q * std::sqrt(q) * (plan_->power > 2 ? q : 1);
   }
   PathGradient gradient(double t, double, double dg, Rng&) const { return line_.gradient(t, dg); }

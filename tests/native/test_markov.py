@@ -112,6 +112,28 @@ def test_implied_correlation(kernel, sampler, start, n, seed):
     check_z(np.maximum(difference, 0), 0, error, "covariance")
 
 
+@pytest.mark.parametrize(("kernel", "sampler"), PAIRS)
+def test_slopes_after_a_known_start(kernel, sampler, n, seed):
+    """Means and covariance of central differences, at ends of cells and between, given value and slope at 0: what the start
+    does to later slopes shows little in the values."""
+    h, at = 0.005, np.array([0.25, 0.5, 1.0, 1.6, 2.25])
+    t = np.sort(np.concatenate([at - h, at + h]))
+    difference = np.kron(np.eye(len(at)), [-1, 1]) / (2 * h)
+    points, k = t[:, None] * [1.0, 0, 0], KERNELS[kernel](1.0)
+    value, slope = k(points, np.zeros((1, 3)))[:, 0], -k.gradient(points, np.zeros((1, 3)))[:, 0, 0]
+    lambda2 = gp_slope(kernel)
+    covariance = k(points, points) - np.outer(value, value) - np.outer(slope, slope) / lambda2
+    state = {"value": np.full(n, 5.5), "gradient": np.tile([-0.4, 0.1, 0.2], (n, 1))}
+    g = gn.line_values(process(kernel, 5.0), *along_x(n), t, start=state, sampler=sampler, tolerance=1e-6, seed=seed) - 5
+    slopes = g[np.isfinite(g).all(axis=1)] @ difference.T
+    m, expected = len(slopes), difference @ covariance @ difference.T
+    assert m > 0.999 * n
+    mean, variance = difference @ (0.5 * value - 0.4 * slope / lambda2), np.diag(expected)
+    check_z(slopes.mean(axis=0), mean, np.sqrt(variance / m), "mean")
+    error = np.sqrt((np.outer(variance, variance) + expected**2) / m)
+    check_z((slopes - mean).T @ (slopes - mean) / m, expected, error, "covariance")
+
+
 @pytest.mark.parametrize("kernel", ROUGH)
 def test_conditioned_start_at_tiny_distances(kernel, seed):
     """Oracle 8 for Markov lines: Var f = c t³ or c t⁵ next to a known value and slope, down to 1e-8 of a length scale."""
