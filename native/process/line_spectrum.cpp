@@ -121,7 +121,7 @@ void certify(const Radial& radial, double highest, LineSpectrum& s) {
 
 }  // namespace
 
-LineSpectrum line_spectrum(const Radial& radial, double reach) {
+std::optional<LineSpectrum> line_spectrum(const Radial& radial, double reach) {
   LineSpectrum s;
   s.reach = reach;
   if (radial.family == Radial::Family::constant) {
@@ -139,9 +139,7 @@ LineSpectrum line_spectrum(const Radial& radial, double reach) {
   for (;; spacing *= 0.9) {
     s.frequency.clear();
     s.weight.clear();
-    if (highest / spacing > kMostFrequencies)
-      refuse("The spectral sampler does not reach a rational quadratic kernel of alpha ",
-             radial.alpha, " over ", reach, " length scales: take a larger alpha.");
+    if (highest / spacing > kMostFrequencies) return std::nullopt;
     (rational ? place_graded : place_evenly)(m, spacing, highest, s);
     certify(radial, highest, s);
     if (s.error <= bound && std::abs(s.slope_variance - radial.lambda2()) <= kSlopeBound) return s;

@@ -3,6 +3,7 @@
 // to a certified error: the largest difference on a dense set of lags.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "kernel/radial.h"
@@ -16,7 +17,8 @@ struct LineSpectrum {
   double slope_variance = 0;  // Σ weight frequency², λ₂ but for the error of slopes
 };
 
-// Throws std::invalid_argument where the radial is not smooth, or too few frequencies would do.
-LineSpectrum line_spectrum(const Radial& radial, double reach);
+// Nothing where it would take more than 4096 frequencies; throws std::invalid_argument where the
+// radial is not smooth.
+std::optional<LineSpectrum> line_spectrum(const Radial& radial, double reach);
 
 }  // namespace gpis

@@ -5,10 +5,12 @@
 namespace gpis {
 namespace {
 
-// Lines longer than the last table take it all the same: correlations at lags within its reach are
-// right on a line of any length, those beyond are not (the plan says so). A constant needs one.
-constexpr double kReaches[] = {8, 16, 32, 64, 128, 256};
-constexpr std::size_t kMostWaves = 1 << 17;
+// Tables for lines of 8, 16, 32, … length scales, each line takes the shortest that it fits in.
+// Those beyond kEveryReach are made where finite bounds ask for them. Lines longer than the last
+// take it all the same: correlations at lags within its reach are right on a line of any length,
+// those beyond are not (the plan says so).
+constexpr double kShortest = 8, kEveryReach = 256;
+constexpr std::size_t kMostWaves = 1 << 17, kMostLongWaves = 1 << 13;  // in all, in a long table
 constexpr double kNegligible = 1e-7;  // share of the variance of a term that is left out
 
 std::vector<Term> terms_of(const Kernel& kernel) {
@@ -55,20 +57,30 @@ SpectralPath::Plan::Plan(const std::vector<Term>& terms, const Box3& bounds) {
     components.push_back({term, i});
     variance += term.weight;
   }
-  std::size_t waves = 0;
+  std::size_t waves = 0;  // on a line that takes the last tables
   for (std::size_t i = 0; i < radials.size(); ++i) {
+    const bool constant = radials[i].family == Radial::Family::constant;
+    std::size_t per_frequency = 0, most = 1;
+    for (const Component& c : components)
+      if (c.table == i) per_frequency += c.term.modulated() ? 2 : 1;
     Table table;
-    for (const double reach : kReaches) {
-      table.push_back(line_spectrum(radials[i], reach));
-      if (reach >= longest[i] || radials[i].family == Radial::Family::constant) break;
+    for (double next = kShortest; next < 2 * longest[i] || table.empty(); next *= 2) {
+      if (next > kEveryReach && !std::isfinite(longest[i])) break;
+      std::optional<LineSpectrum> spectrum = line_spectrum(radials[i], next);
+      const std::size_t count = spectrum ? spectrum->weight.size() : 0;
+      if (next > kEveryReach && (!spectrum || count * per_frequency > kMostLongWaves)) break;
+      if (!spectrum)
+        refuse("The spectral sampler does not reach a rational quadratic kernel of alpha ",
+               radials[i].alpha, " over ", next, " length scales: take a larger alpha.");
+      most = std::max(most, count);
+      table.push_back(std::move(*spectrum));
+      if (constant) break;
     }
-    if (radials[i].family != Radial::Family::constant && table.back().reach < longest[i])
-      reach = std::min(reach, table.back().reach);
+    waves += most * per_frequency;
+    if (!constant && table.back().reach < longest[i]) reach = std::min(reach, table.back().reach);
     tables.push_back(std::move(table));
   }
   for (const Component& c : components) {
-    const LineSpectrum& last = tables[c.table].back();
-    waves += last.weight.size() * (c.term.modulated() ? 2 : 1);
     double error = 0;
     for (const LineSpectrum& s : tables[c.table]) error = std::max(error, s.error);
     correlation_error += c.term.weight / variance * error;
