@@ -20,14 +20,6 @@ bool is_ours(const std::string& name) {
              std::end(kPaintedGrids);
 }
 
-openvdb::MetaMap metadata(const std::string& path) {
-  return with_vdb_errors(path, "read", [&] {
-    openvdb::io::File file(path);
-    file.open(/*delayLoad=*/false);
-    return openvdb::MetaMap(*file.getMetadata());
-  });
-}
-
 openvdb::FloatGrid::Ptr read_mean(const std::string& path, const std::string& name) {
   const auto any = open_vdb_grid(path, name);
   openvdb::FloatGrid::Ptr grid;
@@ -99,7 +91,7 @@ void PaintedFields::Impl::open(const PaintSource& source) {
   layers.box = layers.base_box = layers.mean.grid[0]->evalActiveVoxelBoundingBox();
   if (layers.box.empty())
     refuse("", vdb_grid_quoted(source.path, source.mean), " is empty: no voxel is active.");
-  const openvdb::MetaMap meta = metadata(source.path);
+  const openvdb::MetaMap meta = vdb_metadata(source.path);
   const auto low = meta.getMetadata<openvdb::Vec3IMetadata>(kBaseMin),
              high = meta.getMetadata<openvdb::Vec3IMetadata>(kBaseMax);
   if (!low)  // else it was checked before it was painted on
@@ -168,7 +160,7 @@ void PaintedFields::write(const std::string& path, const std::string& strokes) c
 
 std::string read_strokes(const std::string& path) {
   vdb_grid_names(path);  // the sentences about files that are none
-  const auto strokes = metadata(path).getMetadata<openvdb::StringMetadata>(kStrokes);
+  const auto strokes = vdb_metadata(path).getMetadata<openvdb::StringMetadata>(kStrokes);
   return strokes ? strokes->value() : std::string();
 }
 

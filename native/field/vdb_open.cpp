@@ -8,6 +8,7 @@
 
 #include "core/errors.h"
 #include "field/check.h"
+#include "field/vdb_reader.h"
 
 namespace gpis {
 namespace {
@@ -21,8 +22,7 @@ auto with_file(const std::string& path, const Action& action) {
     refuse("\"", path, "\" is not a file; it takes the path of a .vdb file.");
   return with_vdb_errors(path, "read", [&] {
     openvdb::initialize();
-    openvdb::io::File file(path);
-    file.open(/*delayLoad=*/false);
+    VdbReader file(path);
     return action(file);
   });
 }
@@ -37,28 +37,25 @@ void fill_level_set(openvdb::GridBase& grid) {
   static_cast<GridType&>(grid).tree().root().setBackground(outside, /*updateChildNodes=*/false);
 }
 
-std::vector<std::string> names_in(const openvdb::io::File& file) {
-  std::vector<std::string> names;
-  for (auto name = file.beginName(); name != file.endName(); ++name)
-    names.push_back(name.gridName());
-  return names;
-}
-
 }  // namespace
 
 std::vector<std::string> vdb_grid_names(const std::string& path) {
-  return with_file(path, names_in);
+  return with_file(path, [](VdbReader& file) { return file.names(); });
+}
+
+openvdb::MetaMap vdb_metadata(const std::string& path) {
+  return with_file(path, [](VdbReader& file) { return file.metadata(); });
 }
 
 openvdb::GridBase::Ptr open_vdb_grid(const std::string& path, const std::string& name) {
-  return with_file(path, [&](openvdb::io::File& file) {
-    if (!file.hasGrid(name)) {
+  return with_file(path, [&](VdbReader& file) {
+    const auto grid = file.read(name);
+    if (!grid) {
       std::string all;
-      for (const std::string& other : names_in(file)) all += (all.empty() ? "" : ", ") + other;
+      for (const std::string& other : file.names()) all += (all.empty() ? "" : ", ") + other;
       refuse("\"", path, "\" has no grid '", name, "'; it holds: ", all.empty() ? "none" : all,
              ".");
     }
-    auto grid = file.readGrid(name);
     fill_level_set<openvdb::FloatGrid>(*grid);
     fill_level_set<openvdb::DoubleGrid>(*grid);
     return grid;

@@ -214,3 +214,44 @@ def test_only_files_are_replaced(tmp_path, path, words):
 def test_a_grid_is_a_named_array(tmp_path, grids):
     with pytest.raises(ValueError, match="write_vdb: "):
         gn.write_vdb(tmp_path / "x.vdb", {**grids, "origin": (0, 0, 0), "voxel_size": 1.0})
+
+
+def damaged(tmp_path, change):
+    """A written grid, changed where it says what it holds."""
+    good, bad = tmp_path / "good.vdb", tmp_path / "bad.vdb"
+    mean = np.linspace(-1, 1, 27).reshape(3, 3, 3)
+    gn.write_vdb(good, {"mean": mean, "origin": (0, 0, 0), "voxel_size": 0.1})
+    bad.write_bytes(change(good.read_bytes()))
+    return bad
+
+
+@pytest.mark.parametrize("key", [b"name", b"Tree_float_5_4_3"])
+def test_a_length_that_is_damaged(tmp_path, key):
+    """OpenVDB alone fills four gigabytes, and reads on where the file has ended."""
+
+    def change(data):
+        at = data.index(key) - 4
+        assert int.from_bytes(data[at : at + 4], "little") == len(key)
+        return data[:at] + b"\x00\xff\xff\xff" + data[at + 4 :]
+
+    path = damaged(tmp_path, change)
+    with pytest.raises(ValueError, match="bad.vdb.*damaged"):
+        gn.VdbField(path, "mean")
+
+
+def test_every_cut_gets_a_sentence(tmp_path):
+    whole = len(damaged(tmp_path, lambda data: data).read_bytes())
+    for length in range(0, whole - 8, 7):
+        path = damaged(tmp_path, lambda data, length=length: data[:length])
+        with pytest.raises(ValueError, match="bad.vdb"):
+            gn.VdbField(path, "mean")
+
+
+def test_a_name_that_is_no_text(tmp_path):
+    path = damaged(tmp_path, lambda data: data.replace(b"mean", b"me\xffn"))
+    with pytest.raises(ValueError, match="has no grid 'mean'; it holds: me[?]n"):
+        gn.VdbField(path, "mean")
+    assert [grid["name"] for grid in gn.vdb_grids(path)] == ["me?n"]
+    path = damaged(tmp_path, lambda data: data.replace(b"Tree_float", b"Tree_fl\xffat"))
+    with pytest.raises(ValueError, match="Tree_fl[?]at"):
+        gn.VdbField(path, "mean")
