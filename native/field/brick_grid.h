@@ -36,12 +36,14 @@ class BrickGrid {
     float min, max;
     std::int64_t values;  // offset of the 9³ values, -1 where all of them are `min`
   };
-  const Brick& brick_of(const Index3& cell) const {
-    return bricks_[(static_cast<std::size_t>(cell[0] / kCells) * bricks_along_[1] +
-                    cell[1] / kCells) *
-                       bricks_along_[2] +
-                   cell[2] / kCells];
+  const Brick& brick_of(const Index3& cell) const { return brick(brick_index(cell)); }
+  // Of the brick that holds a cell: the same in all grids of the same nodes.
+  std::size_t brick_index(const Index3& cell) const {
+    return (static_cast<std::size_t>(cell[0] / kCells) * bricks_along_[1] + cell[1] / kCells) *
+               bricks_along_[2] +
+           cell[2] / kCells;
   }
+  const Brick& brick(std::size_t index) const { return bricks_[index]; }
   // The corners of a cell in a brick that is not constant: index 4i + 2j + k.
   void corners(const Brick& brick, const Index3& cell, float out[8]) const {
     const float* v = values_.data() + brick.values +

@@ -15,20 +15,25 @@ struct TensorSample {
   std::array<SymMat3, 3> gradient;  // ∂A/∂x_i, exact for the interpolant
 };
 
+// On a line: A and ∂_d A.
+struct TensorSlope {
+  SymMat3 value, slope;
+};
+
 class TensorField {
  public:
   virtual ~TensorField() = default;
   virtual SymMat3 value(const Vec3& p) const = 0;
   virtual TensorSample sample(const Vec3& p) const = 0;
+  // At o + t d, with the derivative that holds at o + side d, where t lies at the end of a piece
+  // that `side` lies in.
+  virtual TensorSlope along(const Vec3& o, const Vec3& d, double t, double side) const = 0;
   // Certified bounds of the eigenvalues over all space.
   virtual Range eigenvalues() const = 0;
-  // Along a line of direction d, ∂_d A may jump (at the faces of cells). A bound of the sum of
-  // √(⅛ tr((A⁻¹ J)²)) over the jumps J on a stretch of length h: rate · h + once. A process with
-  // the covariance of Paciorek and Schervish has slopes that jump with these deviations.
-  struct Kinks {
-    double once = 0, rate = 0;
-  };
-  virtual Kinks kinks(const Vec3& d) const = 0;
+  // On the line o + t d, ∂_d A may jump (at the faces of cells). A bound of the sum of
+  // √(⅛ tr((A⁻¹ J)²)) over the jumps J between two t. A process with the covariance of Paciorek and
+  // Schervish has slopes that jump with these deviations.
+  virtual double kinks(const Vec3& o, const Vec3& d, double t_begin, double t_end) const = 0;
 };
 using TensorFieldPtr = std::shared_ptr<const TensorField>;
 

@@ -79,45 +79,45 @@ void TensorGridField::check_nodes(const std::function<std::string(const Index3&)
   eigenvalues_ = range;
 }
 
-// At a face across axis i, ∂_i A jumps by the second difference D of the nodes there. Where
-// -cA <= D <= cA at the nodes, the same holds between them; c is at most the root of tr((A⁻¹D)²).
+// At a face across axis i, ∂_i A jumps by the second difference D of the nodes there; c is at most
+// the root of tr((A⁻¹D)²).
+double TensorGridField::kink_at(int axis, const Index3& at) const {
+  Index3 before = at, after = at;
+  before[axis] = std::max(at[axis] - 1, 0);
+  after[axis] = std::min(at[axis] + 1, bricks_[0]->nodes()[axis] - 1);
+  const SymMat3 a = node(at), lower = node(before), upper = node(after);
+  if (same(a, lower) && same(a, upper)) return 0;
+  const SymMat3 inverse_a = Cholesky3(a).inverse();
+  const Mat3 m = inverse_a.matrix() * (lower + upper - a * 2).matrix(), mt = transpose(m);
+  return std::sqrt(std::max(
+      0.0, dot(m.row[0], mt.row[0]) + dot(m.row[1], mt.row[1]) + dot(m.row[2], mt.row[2])));
+}
+
 void TensorGridField::find_kinks() {
-  const Index3& n = bricks_[0]->nodes();
-  for (int axis = 0; axis < 3; ++axis) {
-    double largest = 0;
-    Index3 at;
-    for (at[0] = 0; at[0] < n[0]; ++at[0])
-      for (at[1] = 0; at[1] < n[1]; ++at[1])
-        for (at[2] = 0; at[2] < n[2]; ++at[2]) {
-          Index3 before = at, after = at;
-          before[axis] = std::max(at[axis] - 1, 0);
-          after[axis] = std::min(at[axis] + 1, n[axis] - 1);
-          const SymMat3 a = node(at), lower = node(before), upper = node(after);
-          if (same(a, lower) && same(a, upper)) continue;
-          const SymMat3 inverse_a = Cholesky3(a).inverse();
-          const Mat3 m = inverse_a.matrix() * (lower + upper - a * 2).matrix(), mt = transpose(m);
-          largest = std::max(largest, dot(m.row[0], mt.row[0]) + dot(m.row[1], mt.row[1]) +
-                                          dot(m.row[2], mt.row[2]));
-        }
-    kink_[axis] = std::sqrt(largest);
-  }
+  for (int axis = 0; axis < 3; ++axis)
+    kinks_[axis] =
+        std::make_shared<BrickGrid>(bricks_[0]->nodes(), [this, axis](int i, int j, int k) {
+          return static_cast<float>(kink_at(axis, {i, j, k}));
+        });
 }
 
 SymMat3 TensorGridField::value(const Vec3& p) const {
   return sample(p).value;
 }
 
-TensorSample TensorGridField::sample(const Vec3& p) const {
-  const Vec3 x = object_to_index_.point(p);
+TensorGridField::Place TensorGridField::place(const Vec3& x) const {
   const Index3& n = bricks_[0]->nodes();
-  Index3 cell;
-  Vec3 u;
-  bool outside[3];
+  Place p;
   for (int i = 0; i < 3; ++i) {
-    outside[i] = !(x[i] >= 0 && x[i] <= n[i] - 1);
-    cell[i] = x[i] >= 1 ? (x[i] < n[i] - 1 ? static_cast<int>(x[i]) : n[i] - 2) : 0;
-    u[i] = outside[i] ? (x[i] > 0 ? 1.0 : 0.0) : x[i] - cell[i];
+    p.outside[i] = !(x[i] >= 0 && x[i] <= n[i] - 1);
+    p.cell[i] = x[i] >= 1 ? (x[i] < n[i] - 1 ? static_cast<int>(x[i]) : n[i] - 2) : 0;
+    p.local[i] = p.outside[i] ? (x[i] > 0 ? 1.0 : 0.0) : x[i] - p.cell[i];
   }
+  return p;
+}
+
+TensorSample TensorGridField::sample(const Vec3& p) const {
+  const auto [cell, u, outside] = place(object_to_index_.point(p));
   TensorSample out;
   SymMat3 along[3];  // derivatives by index
   for (int e = 0; e < 6; ++e) {
@@ -146,16 +146,70 @@ TensorSample TensorGridField::sample(const Vec3& p) const {
   return out;
 }
 
-// ⅛ tr((A⁻¹J)²) <= (3/8) c² for J between -cA and cA.
-TensorField::Kinks TensorGridField::kinks(const Vec3& d) const {
-  const Vec3 u = object_to_index_.vector(d);
-  Kinks out;
+TensorSlope TensorGridField::along(const Vec3& o, const Vec3& d, double t, double side) const {
+  const Vec3 origin = object_to_index_.point(o);
+  Vec3 direction = object_to_index_.vector(d);
+  Place at = place(origin + direction * side);
   for (int i = 0; i < 3; ++i) {
-    const double jump = std::sqrt(3.0 / 8) * kink_[i] * std::abs(u[i]);
-    out.once += jump;
-    out.rate += jump * std::abs(u[i]);
+    if (at.outside[i])
+      direction[i] = 0;
+    else
+      at.local[i] = origin[i] + direction[i] * t - at.cell[i];
+  }
+  const Vec3& u = at.local;
+  const std::size_t index = bricks_[0]->brick_index(at.cell);
+  TensorSlope out;
+  for (int e = 0; e < 6; ++e) {
+    const BrickGrid::Brick& brick = bricks_[e]->brick(index);
+    out.value[e] = brick.min;
+    if (brick.values < 0) continue;
+    float c[8];
+    bricks_[e]->corners(brick, at.cell, c);
+    double v[4], slope[4];  // linear along z, then y, then x, each with its slope
+    for (int i = 0; i < 4; ++i) {
+      const double dz = double{c[2 * i + 1]} - c[2 * i];
+      v[i] = c[2 * i] + u.z * dz;
+      slope[i] = direction.z * dz;
+    }
+    for (int i = 0; i < 2; ++i) {
+      const double dy = v[2 * i + 1] - v[2 * i];
+      slope[i] = slope[2 * i] + u.y * (slope[2 * i + 1] - slope[2 * i]) + direction.y * dy;
+      v[i] = v[2 * i] + u.y * dy;
+    }
+    const double dx = v[1] - v[0];
+    out.value[e] = v[0] + u.x * dx;
+    out.slope[e] = slope[0] + u.x * (slope[1] - slope[0]) + direction.x * dx;
   }
   return out;
+}
+
+// ⅛ tr((A⁻¹J)²) <= (3/8) c² for J between -cA and cA.
+double TensorGridField::kinks(const Vec3& o, const Vec3& d, double t_begin, double t_end) const {
+  const Vec3 origin = object_to_index_.point(o), direction = object_to_index_.vector(d);
+  const Index3& n = bricks_[0]->nodes();
+  double sum = 0;
+  for (int i = 0; i < 3; ++i) {
+    if (direction[i] == 0) continue;
+    const double a = origin[i] + direction[i] * t_begin, b = origin[i] + direction[i] * t_end;
+    const double low = std::max(std::min(a, b), -0.5), high = std::min(std::max(a, b), n[i] - 0.5);
+    double jumps = 0;
+    for (int face = static_cast<int>(std::ceil(low)); face < high; ++face) {
+      Place at = place(origin + direction * ((face - origin[i]) / direction[i]));
+      at.cell[i] = std::min(face, n[i] - 2);
+      const BrickGrid::Brick& brick = kinks_[i]->brick_of(at.cell);
+      double kink = brick.max;
+      if (brick.values >= 0) {
+        float c[8];
+        kinks_[i]->corners(brick, at.cell, c);
+        const int stride = 4 >> i, layer = face > at.cell[i] ? stride : 0;
+        const int other = i == 0 ? 2 : 4, third = i == 2 ? 2 : 1;
+        kink = std::max({c[layer], c[layer + other], c[layer + third], c[layer + other + third]});
+      }
+      jumps += kink;
+    }
+    sum += std::abs(direction[i]) * jumps;
+  }
+  return std::sqrt(3.0 / 8) * sum;
 }
 
 }  // namespace gpis

@@ -22,18 +22,30 @@ class TensorGridField final : public TensorField {
 
   SymMat3 value(const Vec3& p) const override;
   TensorSample sample(const Vec3& p) const override;
+  TensorSlope along(const Vec3& o, const Vec3& d, double t, double side) const override;
   Range eigenvalues() const override { return eigenvalues_; }
-  Kinks kinks(const Vec3& d) const override;
+  double kinks(const Vec3& o, const Vec3& d, double t_begin, double t_end) const override;
 
  private:
+  // Where a point in index space lies: its cell, and where in it.
+  struct Place {
+    Index3 cell;
+    Vec3 local;
+    bool outside[3];
+  };
+  Place place(const Vec3& index) const;
+
   SymMat3 node(const Index3& at) const;
+  double kink_at(int axis, const Index3& at) const;
   void check_nodes(const std::function<std::string(const Index3&)>& node_name);
   void find_kinks();
 
   Bricks bricks_;
   Affine object_to_index_;
   Range eigenvalues_;
-  double kink_[3] = {0, 0, 0};  // largest relative jump of ∂A at faces across each axis of the grid
+  // At every node, a bound c of the second difference D of A across it along each axis: -cA <= D <=
+  // cA. The same holds between nodes with the largest c of them.
+  std::array<std::shared_ptr<const BrickGrid>, 3> kinks_;
 };
 
 }  // namespace gpis

@@ -15,9 +15,15 @@ class TransformedTensorField final : public TensorField {
     return congruence(linear_, field_->value(inverse_.point(p)));
   }
   TensorSample sample(const Vec3& p) const override;
+  TensorSlope along(const Vec3& o, const Vec3& d, double t, double side) const override {
+    const TensorSlope inner = field_->along(inverse_.point(o), inverse_.vector(d), t, side);
+    return {congruence(linear_, inner.value), congruence(linear_, inner.slope)};
+  }
   Range eigenvalues() const override { return eigenvalues_; }
   // J becomes M J Mᵀ as A does: A⁻¹J keeps its eigenvalues.
-  Kinks kinks(const Vec3& d) const override { return field_->kinks(inverse_.vector(d)); }
+  double kinks(const Vec3& o, const Vec3& d, double t_begin, double t_end) const override {
+    return field_->kinks(inverse_.point(o), inverse_.vector(d), t_begin, t_end);
+  }
 
  private:
   TensorFieldPtr field_;

@@ -66,7 +66,7 @@ class ConditionedSampler final : public LineSampler {
     void at(long cell, double t, Rng& rng, double& g, double& dg) override {
       now_->at(cell, t, rng, g, dg);
     }
-    double deviation(double h) const override { return now_->deviation(h); }
+    double deviation(double a, double h) const override { return now_->deviation(a, h); }
 
    private:
     const ConditionedSampler& sampler_;

@@ -106,6 +106,31 @@ Covariance::Profile Covariance::profile(double Q) const {
   return sum;
 }
 
+// For the header.
+template Covariance::Profile Covariance::profile<2>(double Q) const;
+
+void Covariance::profiles(const double* Q, int n, double* psi, double* psi1) const {
+  using Array = Eigen::Map<Eigen::ArrayXd>;
+  if (scales_.size() == 1 && scales_[0].radial.family == Radial::Family::squared_exponential) {
+    const Scale& s = scales_[0];
+    const Eigen::Map<const Eigen::ArrayXd> q(Q, n);
+    Array(psi, n) = s.weight * (-0.5 * s.inverse_length2 * q).exp();
+    if (psi1) Array(psi1, n) = -0.5 * s.inverse_length2 * Array(psi, n);
+    return;
+  }
+  for (int i = 0; i < n; ++i) {
+    const Profile f = psi1 ? profile<1>(Q[i]) : profile<0>(Q[i]);
+    psi[i] = f.psi;
+    if (psi1) psi1[i] = f.psi1;
+  }
+}
+
+double Covariance::shortest_inverse2() const {
+  double largest = 0;
+  for (const Scale& s : scales_) largest = std::max(largest, s.inverse_length2);
+  return largest;
+}
+
 // C10 for one pair: S = (A_x + A_y)/2, r = x - y, p = S⁻¹r, Q = rᵀp, N = |A_x|^¼|A_y|^¼/|S|^½.
 struct Covariance::Pair {
   Cholesky3 s;
@@ -234,8 +259,7 @@ double Covariance::between(const LocalPoint& x, const Functional& of_x, const Lo
 double Covariance::length_scale(const LocalPoint& x, const Vec3& d) const {
   double inverse2 = 0;  // 1/ℓ_d²
   if (anisotropy_) {
-    for (const Scale& s : scales_) inverse2 = std::max(inverse2, s.inverse_length2);
-    inverse2 *= dot(d, x.inverse_a * d);
+    inverse2 = shortest_inverse2() * dot(d, x.inverse_a * d);
   } else {
     for (const Term& term : terms_) {
       const Vec3 w = term.whitening * d;

@@ -60,15 +60,20 @@ class Covariance {
   // Metrics, one for each term, in which points further than 1 apart in all of them have
   // correlations below `correlation`; none where none is known.
   std::vector<Mat3> reach_metrics(double correlation) const;
+  // ψ(Q) = Σ weight κ(√Q/ℓ) and its derivatives, for the terms of the kernel under an anisotropy.
+  struct Profile {
+    double psi, psi1, psi2;
+  };
+  Profile profile(double Q) const { return profile<2>(Q); }
+  // ψ and, unless it is null, ψ' of many.
+  void profiles(const double* Q, int n, double* psi, double* psi1) const;
+  // 1/ℓ² of the shortest of these terms.
+  double shortest_inverse2() const;
   // The largest length scale anywhere: a distance in whitened space is at least the distance over
   // it.
   double longest_length() const { return longest_; }
 
  private:
-  // ψ(Q) = Σ weight κ(√Q/ℓ) and its derivatives, for the terms of the kernel under an anisotropy.
-  struct Profile {
-    double psi, psi1, psi2;
-  };
   struct Scale {
     Radial radial;
     double weight, inverse_length2;

@@ -39,6 +39,10 @@ void JointLine::begin(const Plan& plan, const LineGeometry& line, double anchor,
   }
   rebased_ = false;
   lasting_rows_ = rows_.count();
+  if (covariance_->anisotropy()) {
+    rows_.begin_line(line_);
+    on_line_at_anchor_ = rows_.line().at(anchor);
+  }
   rows_.law(at_anchor_, anchor_mean_, anchor_law_);
   pull_end_ = anchor;
   // Of conditions that the line may come to meet, and of what it knows already.
@@ -96,38 +100,29 @@ void JointLine::slope_law(double g0, double& mean, double& deviation) const {
 
 void JointLine::start_free(Rng& rng, Counters& counters, double& g, double& dg) {
   rows_.truncate(lasting_rows_);
-  g = rows_.add_free(at_anchor_, value_row(), rng, counters);
-  dg = rows_.add_free(at_anchor_, slope_row(), rng, counters);
+  const LinePoint* here = line_anchor();
+  g = rows_.add_free(at_anchor_, value_row(), rng, counters, 0, here);
+  dg = rows_.add_free(at_anchor_, slope_row(), rng, counters, 0, here);
 }
 
 double JointLine::start(const PathStart& known, Rng& rng, Counters& counters) {
   rows_.truncate(lasting_rows_);
-  rows_.add_known(at_anchor_, value_row(), known.value, 0, counters);
+  const LinePoint* here = line_anchor();
+  rows_.add_known(at_anchor_, value_row(), known.value, 0, counters, here);
   double slope = known.slope;
   if (known.slope_known)
-    rows_.add_known(at_anchor_, slope_row(), slope, 0, counters);
+    rows_.add_known(at_anchor_, slope_row(), slope, 0, counters, here);
   else
-    slope = rows_.add_free(at_anchor_, slope_row(), rng, counters);
+    slope = rows_.add_free(at_anchor_, slope_row(), rng, counters, 0, here);
   if (known.gradient_known) {
     const Frame across(normalize(line_.direction));
     for (const Vec3& w : {across.s, across.t})
-      rows_.add_known(at_anchor_, {0, w}, dot(w, known.gradient), 0, counters);
+      rows_.add_known(at_anchor_, {0, w}, dot(w, known.gradient), 0, counters, here);
   }
   // A correlation of 1e-6 of what is known no longer matters; lengths at most the longest.
   const double reach = std::min(covariance_->reach(1e-6), 60.0) * covariance_->longest_length();
   pull_end_ = std::max(pull_end_, anchor_ + reach / length(line_.direction));
   return slope;
-}
-
-double JointLine::deviation_from_cubic(double a, double h) const {
-  const LocalPoint p[3] = {point(a), point(a + 0.5 * h), point(a + h)};
-  const Vec3 d = line_.direction;
-  const Functional f[3] = {{-0.5, d * (-h / 8)}, {1, {}}, {-0.5, d * (h / 8)}};
-  double variance = 0;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j <= i; ++j)
-      variance += (i == j ? 1 : 2) * covariance_->between(p[i], f[i], p[j], f[j]);
-  return std::sqrt(std::max(0.0, variance));
 }
 
 // The law of ∇g given all rows. The little variance that they leave to the slope along the line is

@@ -55,9 +55,8 @@ class JointLine {
   void reach(double t, Counters& counters);
   Functional value_row() const { return {}; }
   Functional slope_row() const { return {0, line_.direction}; }
-  // Standard deviation of the middle of [a, a + h] from the cubic through values and slopes of both
-  // ends, exactly.
-  double deviation_from_cubic(double a, double h) const;
+  // The anchor among the points of the line; null unless lengths vary.
+  const LinePoint* line_anchor() const { return rows_.has_line() ? &on_line_at_anchor_ : nullptr; }
 
   const Covariance* covariance_ = nullptr;
   LineGeometry line_;
@@ -76,6 +75,7 @@ class JointLine {
   int block_ = -1;
   const SegmentMemory* segments_ = nullptr;
   double sign_ = 1, pull_ = 0;
+  LinePoint on_line_at_anchor_;
   Eigen::Vector4d anchor_mean_;
   Eigen::Matrix4d anchor_law_;  // of (g, ∇g)
   double pull_end_ = 0;

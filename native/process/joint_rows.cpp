@@ -5,16 +5,26 @@ namespace gpis {
 void JointRows::reset(const Covariance& covariance) {
   covariance_ = &covariance;
   base_ = 0;
+  has_line_ = false;
   truncate(0);
 }
 
 void JointRows::reset(const JointRows& base) {
   covariance_ = base.covariance_;
   base_ = 0;
+  has_line_ = false;
   rows_.assign(base.rows_.begin() + base.base_, base.rows_.end());
+  for (Row& row : rows_) row.on_line = false;
   factor_ = base.factor_;
   xi_ = base.xi_;
   known_norm2_ = base.known_norm2_;
+}
+
+void JointRows::begin_line(const LineGeometry& line) {
+  has_line_ = true;
+  geometry_ = line;
+  line_.reset(*covariance_, line);
+  for (const Row& row : rows_) line_.add(nullptr, row.at, row.what);
 }
 
 void JointRows::truncate(int count) {
@@ -22,19 +32,43 @@ void JointRows::truncate(int count) {
   rows_.resize(n);
   xi_.resize(n);
   factor_.resize(n * (n + 1) / 2);
+  if (has_line_) line_.truncate(count);
   known_norm2_ = 0;
   for (std::size_t i = 0; i < n; ++i)
     if (rows_[i].known) known_norm2_ += xi_[i] * xi_[i];
 }
 
-double JointRows::border(const LocalPoint& at, const Functional& what, double own, double& mean) {
+double JointRows::own(const LocalPoint& at, const Functional& what) const {
+  if (what.value_only()) return what.value * what.value * covariance_->variance();
+  return covariance_->between(at, what, at, what);
+}
+
+void JointRows::covariances(const LocalPoint& at, const Functional& what,
+                            const LinePoint* on_line) {
   const int n = active();
   if (next_.size() < n) next_.resize(2 * n + 16);
+  const Vec3 off = what.slope - geometry_.direction;
+  const bool value = on_line && what.value_only() && what.value == 1;
+  const bool slope = on_line && what.value == 0 && off.x == 0 && off.y == 0 && off.z == 0;
+  if (value) {
+    line_.covariances(*on_line, base_, n, next_.data());
+  } else if (slope) {
+    if (unused_.size() < n) unused_.resize(next_.size());
+    line_.covariances(*on_line, base_, n, unused_.data(), next_.data());
+  }
+  for (int i = 0; i < n; ++i)
+    if (!((value || slope) && row(i).on_line))
+      next_[i] = covariance_->between(at, what, row(i).at, row(i).what);
+}
+
+double JointRows::border(const LocalPoint& at, const Functional& what, double own, double& mean,
+                         const LinePoint* on_line) {
+  covariances(at, what, on_line);
+  const int n = active();
   double left = own;
   mean = 0;
   for (int i = 0; i < n; ++i) {
-    const double c = covariance_->between(at, what, row(i).at, row(i).what);
-    next_[i] = (c - factor_row(i).dot(next_.head(i))) / diagonal(i);
+    next_[i] = (next_[i] - factor_row(i).dot(next_.head(i))) / diagonal(i);
     left -= next_[i] * next_[i];
     mean += next_[i] * xi_[i];
   }
@@ -50,49 +84,63 @@ void JointRows::append(const Row& row, double pivot, double xi) {
 }
 
 JointRows::Known JointRows::add_known(const LocalPoint& at, const Functional& what, double value,
-                                      double noise, Counters& counters) {
-  const double own = covariance_->between(at, what, at, what) + noise;
+                                      double noise, Counters& counters, const LinePoint* on_line) {
+  const double variance = own(at, what) + noise;
   double mean;
-  const double pivot = border(at, what, own, mean);
-  const Known known{std::sqrt(own), pivot / own, value - mean};
-  if (pivot > kPivot * own)
-    append({at, what, value, noise, true}, pivot, known.off / std::sqrt(pivot));
-  else
+  const double pivot = border(at, what, variance, mean, on_line);
+  const Known known{std::sqrt(variance), pivot / variance, value - mean};
+  if (pivot > kPivot * variance) {
+    append({at, what, value, noise, true, false, on_line != nullptr}, pivot,
+           known.off / std::sqrt(pivot));
+    if (has_line_) line_.add(on_line, at, what);
+  } else {
     ++counters.pivots_dropped;
+  }
   return known;
 }
 
 double JointRows::add_free(const LocalPoint& at, const Functional& what, Rng& rng,
-                           Counters& counters, double jitter) {
-  const double own = (1 + jitter) * covariance_->between(at, what, at, what);
+                           Counters& counters, double jitter, const LinePoint* on_line) {
+  const double variance = (1 + jitter) * own(at, what);
   double mean;
-  const double pivot = border(at, what, own, mean);
-  if (!(pivot > kDrawnPivot * own)) {
+  const double pivot = border(at, what, variance, mean, on_line);
+  if (!(pivot > kDrawnPivot * variance)) {
     ++counters.pivots_dropped;
     return mean;
   }
   const double xi = rng.normal(), value = mean + std::sqrt(pivot) * xi;
   ++counters.line_normals;
-  append({at, what, value, own * jitter / (1 + jitter), false}, pivot, xi);
+  append({at, what, value, variance * jitter / (1 + jitter), false, false, on_line != nullptr},
+         pivot, xi);
+  if (has_line_) line_.add(on_line, at, what);
   return value;
 }
 
 void JointRows::rebase(const JointRows& base, int last) {
+  const int first_kept = count() - last;
   std::vector<Row> kept(rows_.end() - last, rows_.end());
   base_ = count();
   const auto from = base.rows_.begin() + base.base_;
   rows_.insert(rows_.end(), from, base.rows_.end());
-  for (auto row = rows_.begin() + base_; row != rows_.end(); ++row) row->copied = true;
+  for (auto row = rows_.begin() + base_; row != rows_.end(); ++row) {
+    row->copied = true;
+    row->on_line = false;
+    if (has_line_) line_.add(nullptr, row->at, row->what);
+  }
   factor_ = base.factor_;
   xi_ = base.xi_;
   known_norm2_ = base.known_norm2_;
-  for (Row& row : kept) {
+  for (int i = 0; i < last; ++i) {
+    Row& row = kept[static_cast<std::size_t>(i)];
     row.copied = true;
-    const double own = covariance_->between(row.at, row.what, row.at, row.what) + row.noise;
+    LinePoint point;
+    if (row.on_line) point = line_.point(first_kept + i);
+    const double variance = own(row.at, row.what) + row.noise;
     double mean;
-    const double pivot = border(row.at, row.what, own, mean);
-    if (pivot > (row.known ? kPivot : kDrawnPivot) * own)
-      append(row, pivot, (row.value - mean) / std::sqrt(pivot));
+    const double pivot = border(row.at, row.what, variance, mean, row.on_line ? &point : nullptr);
+    if (!(pivot > (row.known ? kPivot : kDrawnPivot) * variance)) continue;
+    append(row, pivot, (row.value - mean) / std::sqrt(pivot));
+    if (has_line_) line_.add_copy(first_kept + i);
   }
 }
 
@@ -135,7 +183,13 @@ void JointRows::law(const LocalPoint& at, Eigen::Vector4d& mean,
 }
 
 JointRows::Mean JointRows::mean() const {
-  return {base_, weights(xi_)};
+  Mean out;
+  out.first_row = base_;
+  out.weights = weights(xi_);
+  if (!has_line_) return out;
+  out.slopes = line_.weighted(base_, out.weights);
+  out.elsewhere = active() > 0 && !row(0).on_line;  // they come first
+  return out;
 }
 
 void JointRows::evaluate(const Mean& mean, const LocalPoint& at, const Vec3& d, const SymMat3& da,

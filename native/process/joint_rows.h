@@ -7,7 +7,7 @@
 
 #include "core/counters.h"
 #include "core/rng.h"
-#include "process/covariance.h"
+#include "process/line_rows.h"
 
 namespace gpis {
 
@@ -22,6 +22,11 @@ class JointRows {
   void reset(const Covariance& covariance);
   // Starts with the rows of another: solved once, used by many.
   void reset(const JointRows& base);
+  // Rows from now on may lie on this line, whose covariances are cheaper (length scales that vary
+  // alone): to be called after a reset, with all rows elsewhere.
+  void begin_line(const LineGeometry& line);
+  bool has_line() const { return has_line_; }
+  const LineRows& line() const { return line_; }
   // Forgets all rows but the first `count`.
   void truncate(int count);
   int count() const { return static_cast<int>(rows_.size()); }
@@ -34,13 +39,14 @@ class JointRows {
     double left;       // share of its variance that they leave
     double off;        // how far it lies from what they say
   };
-  // A functional with a known value (known but for noise of this variance).
+  // A functional with a known value (known but for noise of this variance). `on_line`: the same
+  // point as one of the line; null: elsewhere.
   Known add_known(const LocalPoint& at, const Functional& what, double value, double noise,
-                  Counters& counters);
+                  Counters& counters, const LinePoint* on_line = nullptr);
   // A functional drawn given the rows before it, with independent noise of `jitter` times its own
   // variance; its value.
   double add_free(const LocalPoint& at, const Functional& what, Rng& rng, Counters& counters,
-                  double jitter = 0);
+                  double jitter = 0, const LinePoint* on_line = nullptr);
   // From now on rows are drawn given those of `base` and the `last` active rows alone.
   void rebase(const JointRows& base, int last);
 
@@ -74,11 +80,18 @@ class JointRows {
   struct Mean {
     int first_row = 0;
     std::vector<double> weights;
+    std::vector<LineRows::Slopes> slopes;  // of rows on the line
+    bool elsewhere = true;                 // some rows are not on it
   };
   Mean mean() const;
   // That mean and its slope along d; `da` is ∂_d A.
   void evaluate(const Mean& mean, const LocalPoint& at, const Vec3& d, const SymMat3& da, double& g,
                 double& dg) const;
+  // The same of rows that are all on the line.
+  void evaluate(const Mean& mean, const LinePoint& at, double& g, double& dg) const {
+    g = dg = 0;
+    line_.sum(at, mean.first_row, mean.weights, mean.slopes, g, dg);
+  }
 
   // Norm, in the space of the kernel, of the mean that the known rows make: it exceeds the mean
   // anywhere, in units of the deviation of g.
@@ -91,6 +104,7 @@ class JointRows {
     double value, noise;
     bool known;
     bool copied = false;  // from a base, or kept when others were forgotten
+    bool on_line = false;
   };
   using FactorRow = Eigen::Map<const Eigen::VectorXd>;
 
@@ -104,7 +118,11 @@ class JointRows {
   const Row& row(int i) const { return rows_[static_cast<std::size_t>(base_ + i)]; }
   // Fills next_ with the row's entries of the factor: the mean that the rows before it leave to it,
   // and the variance.
-  double border(const LocalPoint& at, const Functional& what, double own, double& mean);
+  double border(const LocalPoint& at, const Functional& what, double own, double& mean,
+                const LinePoint* on_line);
+  // Covariances with the active rows, into next_.
+  void covariances(const LocalPoint& at, const Functional& what, const LinePoint* on_line);
+  double own(const LocalPoint& at, const Functional& what) const;
   void append(const Row& row, double pivot, double xi);
 
   const Covariance* covariance_ = nullptr;
@@ -112,7 +130,10 @@ class JointRows {
   int base_ = 0;
   std::vector<double> factor_;  // packed lower triangle, row by row
   std::vector<double> xi_;      // whitened values
-  Eigen::VectorXd next_;
+  Eigen::VectorXd next_, unused_;
+  LineRows line_;  // its rows are those of rows_
+  LineGeometry geometry_;
+  bool has_line_ = false;
   double known_norm2_ = 0;
 };
 

@@ -20,7 +20,7 @@ class LineNoise {
   virtual void prepare(long cell, Rng& rng, Counters& counters) = 0;
   virtual void at_right(long cell, double& g, double& dg) = 0;
   virtual void at(long cell, double t, Rng& rng, double& g, double& dg) = 0;
-  virtual double deviation(double h) const = 0;
+  virtual double deviation(double a, double h) const = 0;
 };
 
 template <LinePath Path>
@@ -50,7 +50,7 @@ class PathNoise final : public LineNoise {
   void at(long cell, double t, Rng& rng, double& g, double& dg) override {
     path_.at(cell, t, rng, g, dg);
   }
-  double deviation(double h) const override { return path_.deviation(h); }
+  double deviation(double a, double h) const override { return deviation_over(path_, a, h); }
 
  private:
   Path& path_;

@@ -142,7 +142,8 @@ class March {
   double stride_end(const Point& from, double b, double t_end) {
     const double far = cell_end(cell_ + 1), h = far - from.t;
     if (!(far <= std::min({from.t + smooth_step_, t_end, piece_end_}))) return b;
-    if (!(from.f > path_.deviation(h) * from.sigma && from.f + h / 3 * from.df > 0)) return b;
+    if (!(from.f > deviation_over(path_, from.t, h) * from.sigma && from.f + h / 3 * from.df > 0))
+      return b;
     last_cell_ = cell_ + 1;
     path_.prepare(last_cell_, rng_, counters_);
     return far;
@@ -151,6 +152,7 @@ class March {
   void enter(double a, double b) {
     if constexpr (MeanLine::kBreaks) mean_.enter(a, b);
     if constexpr (SigmaLine::kBreaks) sigma_.enter(a, b);
+    if constexpr (requires { path_.enter(a, b); }) path_.enter(a, b);
   }
 
   // Right after the start the remembered value and slope may hold f lower than the prior's
@@ -208,7 +210,7 @@ class March {
     const double h = whole - from.t;
     const double mean = 0.5 * (from.mean + to.mean - mean_slope_ * h);
     const double g = std::min({from.g, to.g, from.g + h / 3 * from.dg, to.g - h / 3 * to.dg}) -
-                     path_.deviation(h);
+                     deviation_over(path_, from.t, h);
     const double middle = 0.5 * (from.sigma + to.sigma), spread = 0.5 * sigma_slope_ * h;
     const double sigma = g < 0 ? middle + spread : std::max(0.0, middle - spread);
     if (!(mean + sigma * g > 0)) return false;
@@ -284,7 +286,8 @@ class March {
   Verdict classify_step(const Point& a, const Point& b) const {
     const double h = b.t - a.t;
     const double sigma = std::max(a.sigma, b.sigma) + std::abs(b.dsigma - a.dsigma) * h;
-    return classify(a, b, path_.deviation(h) * sigma + mean_deviation_ * (h * h) * (h * h));
+    return classify(a, b,
+                    deviation_over(path_, a.t, h) * sigma + mean_deviation_ * (h * h) * (h * h));
   }
 
   // `verdict` is that of the whole step: none is left to the caller.

@@ -19,6 +19,8 @@ class NystromPath : public JointLine {
   struct Plan : JointLine::Plan {
     Plan(const GaussianProcess& process, const Box3& bounds);
     double spacing = 0.5;  // of nodes, in local length scales
+    // Where lengths vary, the cubic over a step h is off by this times (h/ℓ)⁴, see deviation.
+    double cubic = 0;
   };
 
   void reset(const Plan& plan, const LineGeometry& line, double anchor, double t_end,
@@ -32,29 +34,45 @@ class NystromPath : public JointLine {
     evaluate(anchor_ + (cell + 1) * step_, g, dg);
   }
   void at(long, double t, Rng&, double& g, double& dg) const { evaluate(t, g, dg); }
-  double deviation(double h) const;
+  // Of the fields' pieces: where A has a kink at an end, its slope there is that between them.
+  void enter(double a, double b) {
+    piece_begin_ = a;
+    piece_end_ = b;
+  }
+  double deviation(double a, double h) const;
 
  private:
   static constexpr int kBlock = 8;   // nodes of a block
   static constexpr int kBeyond = 3;  // nodes behind its end
 
+  static constexpr double kSliver = 1e-6;
+
   struct Block {
     double begin, end;
     JointRows::Mean mean;
   };
+  struct Node {
+    double t;
+    LinePoint at;  // where lengths vary
+    double length_scale;
+  };
 
-  // The node after t.
-  double next_node(double t) const;
+  Node node(double t) const;
+  Node after(const Node& node) const;
+  double plan_step(double t_end) const;
   void begin_run(double t);
   void extend(Rng& rng, Counters& counters);
+  void draw(const Node& node, const Functional& what, Rng& rng, Counters& counters);
   void evaluate(double t, double& g, double& dg) const;
+  bool varies() const { return rows_.has_line(); }
 
-  double spacing_ = 0.5, step_ = 1, t_end_ = 0;
-  std::vector<double> nodes_;  // of this run: the first one is where it begins, the rest is drawn
-  std::size_t end_ = 0;        // the node where the last block ends
+  const Plan* plan_ = nullptr;
+  double step_ = 1, t_end_ = 0;
+  std::vector<Node> nodes_;  // of this run: the first one is where it begins, the rest is drawn
+  std::size_t end_ = 0;      // the node where the last block ends
   std::vector<Block> blocks_;
-  double margin_ = 0;  // of the cell prepared last, see deviation
-  TensorField::Kinks kinks_;
+  double margin_ = 0, kink_margin_ = 0;  // of the cell prepared last, see deviation
+  double piece_begin_ = 0, piece_end_ = 0;
 };
 static_assert(LinePath<NystromPath>);
 

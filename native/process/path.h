@@ -48,6 +48,15 @@ struct PathGradient {
   double free_variance = 1;
 };
 
+// What LinePath says of deviation, for paths that know more of one place than of others too.
+template <class Path>
+double deviation_over(const Path& path, double a, double h) {
+  if constexpr (requires { path.deviation(a, h); })
+    return path.deviation(a, h);
+  else
+    return path.deviation(h);
+}
+
 // Plan: what a path needs once per object, immutable and shared by threads. Its constructor throws
 // a sentence where the path cannot serve the process; `correlation_error` bounds |implied - exact
 // correlation|.
@@ -79,10 +88,10 @@ concept LinePath =
   path.prepare(cell, rng, counters);
   path.at_right(cell, out, out);
   path.at(cell, t, rng, out, out);
-  // c(h): between two evaluated points h apart, g differs from the cubic through both values
+  // c: between two evaluated points a and a + h, g differs from the cubic through both values
   // and slopes by less than c (B₁ + B₂), B Bernstein's polynomials 3s(1-s)² and 3s²(1-s), but
   // for 4.5 standard deviations.
-  { drawn.deviation(t) } -> std::same_as<double>;
+  { deviation_over(drawn, t, t) } -> std::same_as<double>;
   { path.gradient(t, t, t, rng) } -> std::same_as<PathGradient>;
 };
 
