@@ -2,9 +2,9 @@
 
 #include "field/check.h"
 #include "process/covariance.h"
+#include "process/scale_mixture.h"
 
 namespace gpis {
-
 namespace {
 
 bool on_lattice(const Term& term) {
@@ -19,17 +19,29 @@ std::vector<Term> terms_of(const GaussianProcess& process) {
     refuse("A realisation takes a kernel that is a sum of stationary terms; ", kernel.describe(),
            " is a product without such a form. Multiply by squared exponentials and plane waves "
            "only.");
-  if (!process.anisotropy) return *terms;
-  if (terms->size() != 1 || terms->front().radial.family != Radial::Family::squared_exponential)
-    refuse("A realisation under an anisotropy takes the squared exponential, not ",
-           kernel.describe(), ".");
-  return {};  // the lattice under the anisotropy is made apart
+  return *terms;
 }
 
-std::vector<LatticeField> lattice_fields(const std::vector<Term>& terms) {
+// Under an anisotropy: every term a sum of squared exponentials of many lengths (formulas C11).
+std::vector<Realisation::Varying> varying_fields(const GaussianProcess& process, double& error) {
+  const Covariance covariance(process);  // refuses other kernels
+  std::vector<Realisation::Varying> fields;
+  for (const Term& term : terms_of(process)) {
+    const ScaleMixture mixture = scale_mixture(term.radial);
+    error += term.weight / covariance.variance() * mixture.error;
+    for (const auto& [weight, length] : mixture.parts)
+      fields.push_back({VaryingLattice(process.anisotropy, length / term.max_inverse_length(),
+                                       static_cast<int>(fields.size())),
+                        std::sqrt(term.weight * weight)});
+  }
+  return fields;
+}
+
+std::vector<LatticeField> lattice_fields(const GaussianProcess& process) {
   std::vector<LatticeField> fields;
   int number = 0;
-  for (const Term& term : terms)
+  if (process.anisotropy) return fields;
+  for (const Term& term : terms_of(process))
     if (on_lattice(term)) {
       fields.emplace_back(term, number);
       number += fields.back().lattices();
@@ -47,20 +59,20 @@ int count_lattices(const std::vector<LatticeField>& fields) {
 
 Realisation::Realisation(const GaussianProcess& process, Access access, PosteriorPtr posterior)
     : posterior_(std::move(posterior)),
-      lattices_(lattice_fields(terms_of(process))),
-      noise_(access == Access::rays ? LatticeNoise::Cache{{3, 3, 3}, count_lattices(lattices_)}
-                                    // 2 MB a lattice
+      varying_(process.anisotropy ? varying_fields(process, varying_error_)
+                                  : std::vector<Varying>{}),
+      lattices_(lattice_fields(process)),
+      noise_(access == Access::rays ? LatticeNoise::Cache{{3, 3, 3}, lattices()}  // 2 MB a lattice
                                     : LatticeNoise::Cache{{6, 4, 4}, 1}) {
+  if (process.anisotropy) return;
   // Numbers apart from those of the lattices: independent streams.
   int number = 1 << 20;
   for (const Term& term : terms_of(process))
     if (!on_lattice(term)) spectra_.emplace_back(term, number++);
-  if (process.anisotropy) {
-    const Covariance checks_kernel(process);
-    const Term term = process.kernel->terms()->front();
-    varying_.emplace(process.anisotropy, 1 / term.max_inverse_length(), 0);
-    varying_scale_ = std::sqrt(term.weight);
-  }
+}
+
+int Realisation::lattices() const {
+  return count_lattices(lattices_) + static_cast<int>(varying_.size());
 }
 
 void Realisation::draw(std::uint64_t seed, std::optional<double> time) {
@@ -107,14 +119,18 @@ const std::vector<double>& Realisation::weights(int block) {
 
 FieldSample Realisation::free_sample(const Vec3& x) {
   FieldSample g;
-  for (LatticeField& field : lattices_) field.add(noise_, x, g);
+  add_lattices(x, g);
   for (SpectralField& field : spectra_) field.add(x, g);
-  if (varying_) {
-    const FieldSample varying = varying_->sample(noise_, x);
-    g.value += varying_scale_ * varying.value;
-    g.gradient += varying.gradient * varying_scale_;
-  }
   return g;
+}
+
+void Realisation::add_lattices(const Vec3& x, FieldSample& g) {
+  for (LatticeField& field : lattices_) field.add(noise_, x, g);
+  for (Varying& part : varying_) {
+    const FieldSample varying = part.lattice.sample(noise_, x);
+    g.value += part.scale * varying.value;
+    g.gradient += varying.gradient * part.scale;
+  }
 }
 
 void Realisation::set_line(const Vec3& o, const Vec3& d) {
@@ -127,11 +143,7 @@ void Realisation::set_line(const Vec3& o, const Vec3& d) {
 void Realisation::on_line(double t, double& g, double& dg) {
   const Vec3 x = origin_ + direction_ * t;
   FieldSample sample;
-  for (LatticeField& field : lattices_) field.add(noise_, x, sample);
-  if (varying_) {
-    sample = varying_->sample(noise_, x);
-    sample = {sample.value * varying_scale_, sample.gradient * varying_scale_};
-  }
+  add_lattices(x, sample);
   g = sample.value;
   dg = dot(sample.gradient, direction_);
   for (SpectralField& field : spectra_) field.add_on_line(t, g, dg);
@@ -147,8 +159,8 @@ double Realisation::fourth_derivative() const {
   for (const LatticeField& field : lattices_)
     variance += field.fourth_derivative_variance(direction_);
   for (const SpectralField& field : spectra_) variance += field.fourth_derivative_variance();
-  if (varying_)
-    variance += varying_scale_ * varying_scale_ * varying_->fourth_derivative_variance(direction_);
+  for (const Varying& part : varying_)
+    variance += part.scale * part.scale * part.lattice.fourth_derivative_variance(direction_);
   return std::sqrt(variance);
 }
 
@@ -157,8 +169,8 @@ double Realisation::expected_fourth_derivative(const Vec3& d) const {
   for (const LatticeField& field : lattices_) variance += field.fourth_derivative_variance(d);
   for (const SpectralField& field : spectra_)
     variance += field.expected_fourth_derivative_variance(d);
-  if (varying_)
-    variance += varying_scale_ * varying_scale_ * varying_->fourth_derivative_variance(d);
+  for (const Varying& part : varying_)
+    variance += part.scale * part.scale * part.lattice.fourth_derivative_variance(d);
   return std::sqrt(variance);
 }
 
@@ -168,14 +180,13 @@ void Realisation::fill(const Vec3& origin, double spacing, const std::array<int,
   std::fill(g, g + slice * size[0], 0.0f);
   const auto row = [&](int i, int j) { return g + i * slice + j * size[2]; };
   for (LatticeField& field : lattices_) field.add_box(noise_, origin, spacing, size, g);
-  if (varying_)
+  for (Varying& part : varying_)
     for (int j = 0; j < size[1]; ++j)
       for (int i = 0; i < size[0]; ++i)
-        for (int k = 0; k < size[2]; ++k)
-          row(i, j)[k] = static_cast<float>(
-              varying_scale_ *
-              varying_->sample(noise_, origin + Vec3{double(i), double(j), double(k)} * spacing)
-                  .value);
+        for (int k = 0; k < size[2]; ++k) {
+          const Vec3 x = origin + Vec3{double(i), double(j), double(k)} * spacing;
+          row(i, j)[k] += static_cast<float>(part.scale * part.lattice.sample(noise_, x).value);
+        }
   for (SpectralField& field : spectra_)
     for (int i = 0; i < size[0]; ++i)
       field.add_slice(origin + Vec3{i * spacing, 0, 0}, spacing, size[1], size[2], row(i, 0));
@@ -197,9 +208,15 @@ void Realisation::fill(const Vec3& origin, double spacing, const std::array<int,
 std::string Realisation::describe() const {
   std::ostringstream text;
   const int lattices = count_lattices(lattices_);
-  if (varying_)
-    text << "a lattice of white noise under length scales that vary, exactly Gaussian, correlation "
-            "exact to 3e-7";
+  if (!varying_.empty()) {
+    text
+        << varying_.size() << (varying_.size() == 1 ? " lattice" : " lattices")
+        << " of white noise under length scales that vary, exactly Gaussian, correlation exact to ";
+    if (varying_error_ > 0)
+      text << number_text(correlation_error()) << ", variance of slopes to 2e-3";
+    else
+      text << "3e-7";
+  }
   if (lattices > 0)
     text << lattices << (lattices == 1 ? " lattice" : " lattices")
          << " of white noise, exactly Gaussian, correlation exact to 3e-7";

@@ -1,8 +1,9 @@
 // Sampler 6: one sample of g in all of space, with values and gradients at any point in any order
 // (math.md §5.6): the ground truth for the samplers of lines, the memory `global`, and grids for
 // people to look at. A sum of independent parts, one for each term of the kernel's normal form:
-// lattice convolution for squared-exponential and constant terms, also under a field of length
-// scales, random spectral features for the others.
+// lattice convolution for squared-exponential and constant terms, random spectral features for the
+// others; under a field of length scales lattice convolution for all, as mixtures of squared
+// exponentials.
 #pragma once
 
 #include <memory>
@@ -45,9 +46,20 @@ class Realisation {
   std::uint64_t normals() const { return noise_.drawn() + spectral_normals_; }
   // For plans: what it is made of and how Gaussian it is.
   std::string describe() const;
+  double correlation_error() const { return kLatticeError + varying_error_; }
+
+  // A part under a field of length scales.
+  struct Varying {
+    VaryingLattice lattice;
+    double scale;
+  };
 
  private:
+  static constexpr double kLatticeError = 3e-7;  // formulas C11
+
+  int lattices() const;
   FieldSample free_sample(const Vec3& x);
+  void add_lattices(const Vec3& x, FieldSample& g);
   // What the conditions add (Matheron's rule): Σ weight · cov(g, condition), the weights solved in
   // every block from what the conditions say less what the free sample has there.
   void add_conditions(const Vec3& x, FieldSample& g);
@@ -56,9 +68,9 @@ class Realisation {
   PosteriorPtr posterior_;
   std::vector<std::vector<double>> weights_;  // of blocks; empty: not solved yet
   bool near_ = false;                         // conditions are near the line
+  double varying_error_ = 0;                  // of the correlation, by what its mixtures leave out
+  std::vector<Varying> varying_;
   std::vector<LatticeField> lattices_;
-  std::optional<VaryingLattice> varying_;
-  double varying_scale_ = 1;
   std::vector<SpectralField> spectra_;
   LatticeNoise noise_;
   std::uint64_t seed_ = 0, spectral_normals_ = 0;

@@ -35,6 +35,7 @@ RealisationPath::Plan::Plan(const GaussianProcess& p, const Box3&)
     refuse("The kernel ", p.kernel->describe(),
            " has no gradient: the realisation sampler cannot find its surface.");
   posterior = posterior_of(p);
+  correlation_error = Realisation(p, Realisation::Access::rays, nullptr).correlation_error();
 }
 
 void RealisationPath::reset(const Plan& plan, const LineGeometry& line, double anchor, double,

@@ -18,7 +18,7 @@ class RealisationPath {
   struct Plan {
     Plan(const GaussianProcess& process, const Box3& bounds);
     // Of lattices; spectral features have the exact covariance.
-    double correlation_error = 3e-7;
+    double correlation_error;
     std::shared_ptr<const GaussianProcess> process;
     std::shared_ptr<const Covariance> covariance;
     PosteriorPtr posterior;  // null: no conditions
