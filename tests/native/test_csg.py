@@ -70,6 +70,16 @@ VARYING = Leaf(
 RIPPLE = Leaf(gn.PlaneField([1.5, 0, 0], [1, 0, 0], 0.2), 0.4, gn.PlaneWave([5.0, 2.0, 1.0]))
 # Faces that a ray meets within one step: which one is first follows from all of them.
 FACES = [Leaf(gn.PlaneField([2, 0, 0], [-1, 0, 0], 1), s, length) for s, length in ((0.15, 1.0), (0.2, 1.1), (0.1, 0.9))]
+
+
+def ramp(x, slope, low, high):
+    """A mean along the x axis: slope from x on (or up to it), between two levels."""
+    return gn.PlaneField([x, 0, 0], [np.sign(slope), 0, 0], abs(slope)).clamped(low, high)
+
+
+# One that is drawn, clear for certain and there again; the other has become uncertain by then.
+AGAIN = Leaf(ramp(0.3, 6, 0, 1.2) + ramp(1.3, -1, -1.6, 0) + gn.ConstantField(0.1), 0.15, 1.0)
+LATER = Leaf(ramp(1.95, 4, -0.8, 0) + gn.ConstantField(-0.1), 0.2, 1.0)
 BOX = Leaf(gn.BoxField([1.7, 0, 0], [1.2, 2, 2]), 0.0, 1.0)
 
 TREES = {
@@ -94,6 +104,7 @@ TREES = {
         FACES,
         False,
     ),
+    "left behind": (gn.intersection(LATER.process, AGAIN.process), [LATER, AGAIN], False),
     "shared union": (gn.union(*[s.process for s in SAME], shared_noise=True), SAME, True),
     "shared difference": (gn.difference(*[s.process for s in SAME], shared_noise=True), SAME, True),
     "shared inside": (
@@ -122,13 +133,19 @@ def first_crossings(tree, leaves, g, rng):
     i = np.argmax(below[hit], axis=1)
     row = np.flatnonzero(hit)
     step = X[1] - X[0]
-    high, low = composed[row, i - 1], composed[row, i]
-    weight = high / (high - low)
+    # Every leaf is a line between two points: F falls to 0 where the first of them does at which F is 0.
+    before, after = f[row, i - 1], f[row, i]
+    fraction = np.full(before.shape, np.inf)
+    for k in range(len(leaves)):
+        crosses = before[:, k] * after[:, k] <= 0
+        weight = before[crosses, k] / (before[crosses, k] - after[crosses, k])
+        there = before[crosses] + weight[:, None] * (after[crosses] - before[crosses])
+        there[:, k] = 0
+        fraction[crosses, k] = np.where(tree.compose(there) <= 1e-12, weight, np.inf)
     t = np.full(len(f), np.inf)
-    t[row] = X[i - 1] + step * weight
-    # The leaf whose value is F.
+    t[row] = X[i - 1] + step * fraction.min(axis=1)
     part = np.full(len(f), -1)
-    part[row] = np.argmin(np.abs(np.abs(f[row, i]) - np.abs(low[:, None])), axis=1)
+    part[row] = np.argmin(fraction, axis=1)
     gradient = np.full((len(f), 3), np.nan)
     for k, leaf in enumerate(leaves):
         mine = row[part[row] == k]
@@ -265,6 +282,39 @@ def test_rays_inside(n, seed):
     for axis in range(3):
         pair = [h["gradient"][np.isfinite(h["t"]), axis] * s for h, s in ((alone, 1), (leaf, -1))]
         check_same_distribution(*pair, f"gradient {axis}")
+
+
+def test_a_leaf_that_is_certain_at_the_start(n, seed):
+    """One noise, the deviation of one leaf 0 at the start: its sign is known there, the other is drawn outside."""
+    sigma = gn.PlaneField([1, 0, 0], [1, 0, 0], 0.5).clamped(0, 0.4)
+    sure = gn.GaussianProcess(0.2, sigma, gn.SquaredExponential(0.5), bounds=BOUNDS)
+    other = gn.GaussianProcess(0.1, 0.4, gn.SquaredExponential(0.5), bounds=BOUNDS)
+    tree = gn.union(sure, other, shared_noise=True)
+    f = gn.line_values(tree, *rays(n), np.array([1e-9, 2]), seed=seed)[:, 0, 1]
+    expected = np.random.default_rng(seed).normal(0.1, 0.4, 5 * n)
+    check_same_distribution(f, expected[expected > 0], "the other leaf")
+    assert gn.first_hits(tree, *rays(n), 2, seed=seed)["counters"]["line_entry_inside"] == 0
+
+
+@pytest.mark.parametrize("subtracted", [False, True])
+def test_a_ray_that_leaves_a_face_at_the_end_of_a_voxel(subtracted, seed):
+    """The face is a plane of nodes, the start beside it by rounding: a ray that rises finds no root where its voxel ends."""
+    n, rng = 2000, np.random.default_rng(seed)
+    bounds = ((-1, -2, -2), (3, 2, 2))
+    values = np.tile(np.linspace(-2, 2, 9)[:, None, None], (1, 9, 9))
+    sign = -1 if subtracted else 1
+    face = gn.GaussianProcess(gn.GridField(sign * values, 0.5, [-1, -2, -2]), 0, gn.SquaredExponential(0.5), bounds=bounds)
+    rest = gn.GaussianProcess(-1.5 if subtracted else 1.5, 0.3, gn.SquaredExponential(0.5), bounds=bounds)
+    tree = gn.difference(rest, face) if subtracted else gn.union(face, rest)
+    leaf = int(subtracted)
+    origins = np.column_stack([1 - rng.integers(0, 8, n) * 2.0**-53, rng.uniform(-1, 1, (n, 2))])
+    along, angle = 10 ** -rng.uniform(3, 5, n), rng.uniform(0, 2 * pi, n)
+    directions = np.column_stack([along, np.cos(angle), np.sin(angle)])
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    start = {"value": np.full((n, 2), np.nan), "gradient": np.full((n, 2, 3), np.nan)}
+    start["value"][:, leaf], start["gradient"][:, leaf] = 0, [sign, 0, 0]
+    hits = gn.first_hits(tree, origins, directions, 1, start=start, seed=seed)
+    assert np.sum(hits["t"] < 1e-6) == 0
 
 
 def test_start_of_a_fresh_ray_is_joint(n, seed):
