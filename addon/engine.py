@@ -51,11 +51,12 @@ class GPISRenderEngine(bpy.types.RenderEngine):
             preview.draw(self, context, self._preview)
 
 
-def limits_of(scene):
-    """The Sampling panel as a session's limits; ValueError where nothing ends the render."""
+def limits_of(scene, view_layer):
+    """The Sampling panel as a session's limits; ValueError where nothing ends the render. A view layer may have a
+    number of samples of its own."""
     gpis = scene.gpis
     return Limits(
-        samples=gpis.samples if gpis.use_samples else None,
+        samples=view_layer.samples or gpis.samples if gpis.use_samples else None,
         time_limit=gpis.time_limit or None,
         noise_threshold=gpis.noise_threshold if gpis.use_noise_threshold else None,
         seed=gpis.seed,
@@ -68,7 +69,7 @@ def render_frame(engine, depsgraph):
     view_layer = depsgraph.view_layer
     x0, y0, x1, y1 = camera.border(scene)
     width, height = x1 - x0, y1 - y0
-    limits = limits_of(scene)
+    limits = limits_of(scene, view_layer)
     renderer = native()
 
     engine.update_stats("", "Reading the scene")

@@ -61,5 +61,6 @@ def _owners(sync):
     for key, name in sync.mesh_owners.items():
         yield f"meshes['{key}']", f'Object "{name}"', key
     yield "camera", f'Camera "{sync.scene.camera.name}"' if sync.scene.camera is not None else "The view", ""
-    if sync.scene.world is not None:
-        yield "world", f'World "{sync.scene.world.name}"', ""
+    seen = world.of_frame(sync)
+    if seen is not None:
+        yield "world", f'World "{seen.name}"', ""

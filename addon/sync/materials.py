@@ -29,6 +29,9 @@ def of_object(sync, obj):
             slot.material if slot.link == "OBJECT" else material
             for slot, material in zip(slots, data_materials, strict=True)
         ]
+    override = sync.depsgraph.view_layer.material_override
+    if override is not None:
+        data_materials = [override.evaluated_get(sync.depsgraph)] * len(data_materials or [None])
     return [_name(sync, material) for material in data_materials] or [_name(sync, None)]
 
 

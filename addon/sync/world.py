@@ -7,8 +7,13 @@ from . import nodes
 from .state import SyncError, array
 
 
+def of_frame(sync):
+    """The world that this view layer sees; Blender 5 can replace the scene's."""
+    return getattr(sync.depsgraph.view_layer, "world_override", None) or sync.scene.world
+
+
 def describe(sync):
-    world = sync.scene.world
+    world = of_frame(sync)
     if world is None:
         return {"color": (0.0, 0.0, 0.0), "strength": 1.0}
     owner = f'World "{world.name}"'

@@ -1,4 +1,4 @@
-"""View Layer tab: Passes."""
+"""View Layer tab: Passes, Override."""
 
 import bpy
 
@@ -28,9 +28,26 @@ class GPIS_PT_passes(bpy.types.Panel):
                 column.prop(owner, entry.switch, text=entry.name)
 
 
-def register():
-    bpy.utils.register_class(GPIS_PT_passes)
+class GPIS_PT_override(bpy.types.Panel):
+    bl_label = "Override"
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "view_layer"
+    bl_options = {"DEFAULT_CLOSED"}
+    COMPAT_ENGINES = {ENGINE}
+
+    @classmethod
+    def poll(cls, context):
+        return context.engine in cls.COMPAT_ENGINES
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(context.view_layer, "material_override")
+        if hasattr(context.view_layer, "world_override"):  # Blender 5
+            layout.prop(context.view_layer, "world_override")
+        layout.prop(context.view_layer, "samples")
 
 
-def unregister():
-    bpy.utils.unregister_class(GPIS_PT_passes)
+register, unregister = bpy.utils.register_classes_factory((GPIS_PT_passes, GPIS_PT_override))

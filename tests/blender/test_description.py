@@ -58,12 +58,29 @@ def test_limits(stage, extension):
     limits_of = importlib.import_module(extension + ".engine").limits_of
     gpis, render = stage.gpis, stage.render
     gpis.samples, gpis.seed, render.threads_mode = 77, 5, "AUTO"
-    limits = limits_of(stage)
+    limits = limits_of(stage, stage.view_layers[0])
     assert (limits.samples, limits.time_limit, limits.noise_threshold, limits.seed, limits.threads) == (77, None, None, 5, 0)
     gpis.use_samples, gpis.time_limit, gpis.use_noise_threshold, gpis.noise_threshold = False, 12.0, True, 0.25
     render.threads_mode, render.threads = "FIXED", 3
-    limits = limits_of(stage)
+    limits = limits_of(stage, stage.view_layers[0])
     assert (limits.samples, limits.time_limit, limits.noise_threshold, limits.threads) == (None, 12.0, 0.25, 3)
+
+
+def test_overrides_of_a_view_layer(stage, describe, extension):
+    """Its material is that of every object, its samples are those of the render; so is its world from Blender 5 on."""
+    support.cube(stage, "Box", 1, support.diffuse("Own", (0.1, 0.2, 0.3)))
+    layer = stage.view_layers[0]
+    layer.material_override, layer.samples = support.diffuse("Clay", (0.5, 0.6, 0.7)), 9
+    limits_of = importlib.import_module(extension + ".engine").limits_of
+    assert limits_of(stage, layer).samples == 9
+    description = describe()
+    assert description["materials"].keys() == {"Clay"}
+    assert {name for entry in description["objects"] for name in entry["materials"]} == {"Clay"}
+    if hasattr(layer, "world_override"):
+        layer.world_override = bpy.data.worlds.new("Night")
+        layer.world_override.color = (0.0, 0.0, 0.25)
+        layer.world_override.use_nodes = False
+        assert describe()["world"] != description["world"]
 
 
 def test_camera(stage, describe):
