@@ -250,11 +250,4 @@ class GPIS_OT_remove(bpy.types.Operator):
 _CLASSES = (GPIS_OT_make, GPIS_OT_rebake, GPIS_OT_remove)
 
 
-def register():
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister():
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)

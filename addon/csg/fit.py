@@ -290,11 +290,4 @@ class _Work:
 _CLASSES = (GPIS_OT_csg_fit, GPIS_OT_csg_fit_run)
 
 
-def register():
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister():
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)

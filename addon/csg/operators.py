@@ -127,11 +127,4 @@ class GPIS_OT_csg_move(_ListOperator, bpy.types.Operator):
 _CLASSES = (GPIS_OT_csg_add, GPIS_OT_csg_remove, GPIS_OT_csg_move)
 
 
-def register():
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister():
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)

@@ -66,11 +66,4 @@ class GPIS_PT_csg(bpy.types.Panel):
 _CLASSES = (GPIS_UL_csg, GPIS_PT_csg)
 
 
-def register():
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister():
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)

@@ -247,11 +247,4 @@ class GPIS_OT_paint_sample(_InView, bpy.types.Operator):
 _CLASSES = (GPIS_OT_paint, GPIS_OT_paint_sample)
 
 
-def register():
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister():
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)

@@ -124,9 +124,4 @@ def _targets(context):
     return [obj for obj in chosen if obj.type == "VOLUME" and obj.gpis.enabled]
 
 
-def register():
-    bpy.utils.register_class(GPIS_OT_apply_preset)
-
-
-def unregister():
-    bpy.utils.unregister_class(GPIS_OT_apply_preset)
+register, unregister = bpy.utils.register_classes_factory((GPIS_OT_apply_preset,))

@@ -208,11 +208,4 @@ def _length(context, value):
 _CLASSES = (GPIS_PT_object, GPIS_PT_presets, GPIS_PT_anisotropy, GPIS_PT_paths, GPIS_PT_source)
 
 
-def register():
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister():
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)

@@ -141,11 +141,4 @@ def _row(column, name, text):
 _CLASSES = (GPIS_PT_sampling, GPIS_PT_viewport, GPIS_PT_light_paths, GPIS_PT_film, GPIS_PT_statistics, GPIS_PT_plan)
 
 
-def register():
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister():
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)

@@ -73,9 +73,4 @@ def fill(mesh, vertices, triangles):
     mesh.validate()
 
 
-def register():
-    bpy.utils.register_class(GPIS_OT_realise)
-
-
-def unregister():
-    bpy.utils.unregister_class(GPIS_OT_realise)
+register, unregister = bpy.utils.register_classes_factory((GPIS_OT_realise,))
