@@ -46,21 +46,6 @@ SymMat3 taken(Channel channel, const SymMat3& own, const SymMat3& other) {
   return channel == Channel::length_scale ? own * (ratio * ratio) : other * (1 / (ratio * ratio));
 }
 
-// Calls `visit` with the layer of a channel.
-template <class Layers, class Visit>
-auto with_layer(Layers& layers, Channel channel, const Visit& visit) {
-  switch (channel) {
-    case Channel::mean:
-      return visit(layers.mean);
-    case Channel::deviation:
-      return visit(layers.sigma);
-    case Channel::albedo:
-      return visit(layers.albedo);
-    default:
-      return visit(layers.anisotropy);
-  }
-}
-
 template <class Kind>
 std::vector<openvdb::Coord> leaves_of(const typename Kind::Grid& grid) {
   std::vector<openvdb::Coord> out;
@@ -76,22 +61,6 @@ const Layer<Kind>& layer_of(const PaintLayers& layers, Channel channel) {
     return layers.albedo;
   else
     return layers.anisotropy;
-}
-
-// The value of a layer at any point, without its grids the constant.
-template <class Kind>
-typename Kind::Value constant_of(const PaintLayers& layers);
-template <>
-double constant_of<ScalarLayer>(const PaintLayers& layers) {
-  return layers.constant_sigma;
-}
-template <>
-Vec3 constant_of<ColorLayer>(const PaintLayers&) {
-  return {1, 1, 1};
-}
-template <>
-SymMat3 constant_of<TensorLayer>(const PaintLayers& layers) {
-  return layers.constant_anisotropy;
 }
 
 }  // namespace
@@ -308,99 +277,6 @@ void PaintedFields::resample(double voxel_size) {
   transfer(old.anisotropy, next.anisotropy);
   transfer(old.albedo, next.albedo);
   impl_->layers = next;
-}
-
-Box3 PaintedFields::bounds() const {
-  const PaintLayers& layers = impl_->layers;
-  Box3 bounds;
-  for (int corner = 0; corner < 8; ++corner)
-    bounds.include(layers.point({(corner & 1 ? layers.box.max() : layers.box.min()).x(),
-                                 (corner & 2 ? layers.box.max() : layers.box.min()).y(),
-                                 (corner & 4 ? layers.box.max() : layers.box.min()).z()}));
-  return bounds;
-}
-
-Vec3 PaintedFields::voxel_size() const {
-  const Mat3 axes = transpose(impl_->layers.to_object.linear);
-  return {length(axes.row[0]), length(axes.row[1]), length(axes.row[2])};
-}
-
-std::int64_t PaintedFields::memory() const {
-  std::int64_t bytes = 0;
-  impl_->layers.visit([&](const auto& layer, const auto&) {
-    for (std::size_t k = 0; k < layer.grid.size(); ++k)
-      bytes += layer.grid[k]->memUsage() + layer.base[k]->memUsage();
-  });
-  return bytes;
-}
-
-std::vector<std::string> PaintedFields::painted() const {
-  std::vector<std::string> names;
-  impl_->layers.visit([&](const auto& layer, const auto& own) {
-    if (static_cast<const void*>(&layer) != &impl_->layers.mean)
-      names.insert(names.end(), own.begin(), own.end());
-  });
-  return names;
-}
-
-std::vector<double> PaintedFields::values(Channel channel, const std::vector<Vec3>& points) const {
-  const PaintLayers& layers = impl_->layers;
-  std::vector<double> out;
-  with_layer(layers, channel, [&](const auto& layer) {
-    using Kind = typename std::decay_t<decltype(layer)>::Kind;
-    std::optional<LayerReader<Kind>> read;
-    if (layer) read.emplace(layer.grid, layers.box);
-    for (const Vec3& p : points) {
-      const auto v = read ? read->sample(layers.to_index.point(p)) : constant_of<Kind>(layers);
-      if constexpr (std::is_same_v<Kind, ScalarLayer>)
-        out.push_back(v);
-      else if constexpr (std::is_same_v<Kind, ColorLayer>)
-        out.insert(out.end(), {v.x, v.y, v.z});
-      else if (channel == Channel::length_scale)
-        out.push_back(length_scale_of(v));
-      else
-        out.insert(out.end(), {v.xx, v.yy, v.zz, v.xy, v.xz, v.yz});
-    }
-  });
-  return out;
-}
-
-std::pair<double, Vec3> PaintedFields::first_surface(const Vec3& origin, const Vec3& direction,
-                                                     double t_max) const {
-  check_finite("origin", origin);
-  check_direction("direction", direction);
-  const PaintLayers& layers = impl_->layers;
-  const auto mean = layers.mean_reader();
-  const Vec3 o = layers.to_index.point(origin), d = layers.to_index.vector(direction);
-  Box3 box;
-  for (const openvdb::Coord& c : {layers.box.min(), layers.box.max()})
-    box.include({double(c.x()), double(c.y()), double(c.z())});
-  const auto [enter, leave] = clip(box, o, d, 0, t_max);
-  const double step = 0.5 / length(d);
-  double before = enter;
-  bool outside = false;
-  for (double t = enter; t <= leave; t += step) {
-    const bool above = mean.sample(o + d * t) > 0;
-    if (above || !outside) {
-      outside = above;
-      before = t;
-      continue;
-    }
-    double low = before, high = t;
-    for (int i = 0; i < 40; ++i) {
-      const double middle = (low + high) / 2;
-      (mean.sample(o + d * middle) > 0 ? low : high) = middle;
-    }
-    const Vec3 x = o + d * high;
-    Vec3 slope;
-    for (int i = 0; i < 3; ++i) {
-      Vec3 half;
-      half[i] = 0.5;
-      slope[i] = mean.sample(x + half) - mean.sample(x - half);
-    }
-    return {high, layers.gradient_to_object * slope};
-  }
-  return {kInfinity, Vec3{}};
 }
 
 }  // namespace gpis
