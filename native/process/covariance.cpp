@@ -109,19 +109,20 @@ Covariance::Profile Covariance::profile(double Q) const {
 // For the header.
 template Covariance::Profile Covariance::profile<2>(double Q) const;
 
-void Covariance::profiles(const double* Q, int n, double* psi, double* psi1) const {
-  using Array = Eigen::Map<Eigen::ArrayXd>;
+void Covariance::profiles(const double* Q, int n, double* psi, double* psi1, double* psi2) const {
   if (scales_.size() == 1 && scales_[0].radial.family == Radial::Family::squared_exponential) {
-    const Scale& s = scales_[0];
-    const Eigen::Map<const Eigen::ArrayXd> q(Q, n);
-    Array(psi, n) = s.weight * (-0.5 * s.inverse_length2 * q).exp();
-    if (psi1) Array(psi1, n) = -0.5 * s.inverse_length2 * Array(psi, n);
+    using Array = Eigen::Map<Eigen::ArrayXd>;
+    const double slope = -0.5 * scales_[0].inverse_length2;
+    Array(psi, n) = scales_[0].weight * (slope * Eigen::Map<const Eigen::ArrayXd>(Q, n)).exp();
+    Array(psi1, n) = slope * Array(psi, n);
+    Array(psi2, n) = slope * Array(psi1, n);
     return;
   }
   for (int i = 0; i < n; ++i) {
-    const Profile f = psi1 ? profile<1>(Q[i]) : profile<0>(Q[i]);
+    const Profile f = profile<2>(Q[i]);
     psi[i] = f.psi;
-    if (psi1) psi1[i] = f.psi1;
+    psi1[i] = f.psi1;
+    psi2[i] = f.psi2;
   }
 }
 

@@ -65,8 +65,7 @@ class Covariance {
     double psi, psi1, psi2;
   };
   Profile profile(double Q) const { return profile<2>(Q); }
-  // ψ and, unless it is null, ψ' of many.
-  void profiles(const double* Q, int n, double* psi, double* psi1) const;
+  void profiles(const double* Q, int n, double* psi, double* psi1, double* psi2) const;
   // 1/ℓ² of the shortest of these terms.
   double shortest_inverse2() const;
   // The largest length scale anywhere: a distance in whitened space is at least the distance over

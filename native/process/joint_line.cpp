@@ -41,7 +41,7 @@ void JointLine::begin(const Plan& plan, const LineGeometry& line, double anchor,
   lasting_rows_ = rows_.count();
   if (covariance_->anisotropy()) {
     rows_.begin_line(line_);
-    on_line_at_anchor_ = rows_.line().at(anchor);
+    on_line_at_anchor_ = rows_.line().at(anchor, at_anchor_);
   }
   rows_.law(at_anchor_, anchor_mean_, anchor_law_);
   pull_end_ = anchor;
@@ -64,10 +64,15 @@ void JointLine::begin_base(int block, Counters& counters) {
   base_has_segments_ = segments_;
 }
 
+bool JointLine::forgets(double t) const {
+  return rows_.active() - base_.count() > kMostRows ||
+         (posterior_ && posterior_->block(line_.origin + line_.direction * t) != block_);
+}
+
 void JointLine::reach(double t, Counters& counters) {
+  if (!forgets(t)) return;
   const int block = posterior_ ? posterior_->block(line_.origin + line_.direction * t) : -1;
   const int own = rows_.active() - base_.count();
-  if (block == block_ && own <= kMostRows) return;
   if (block != block_) begin_base(block, counters);
   ++counters.factorisations;
   rebased_ = true;
@@ -127,11 +132,14 @@ double JointLine::start(const PathStart& known, Rng& rng, Counters& counters) {
 
 // The law of ∇g given all rows. The little variance that they leave to the slope along the line is
 // the path's error; the path's slope stands.
-PathGradient JointLine::gradient(double t, double, double dg, Rng&) const {
+PathGradient JointLine::gradient(double t, double, double dg, Rng&) {
   const LocalPoint at = point(t);
   Eigen::Vector4d mean;
   Eigen::Matrix4d law;
-  rows_.law(at, mean, law);
+  if (rows_.has_line())
+    rows_.law(at, rows_.line().at(t, at), mean, law);
+  else
+    rows_.law(at, mean, law);
   const Eigen::Matrix4d prior = covariance_->block(at, at);
   const Vec3& direction = line_.direction;
   const Frame frame(normalize(direction));

@@ -38,7 +38,7 @@ class JointLine {
   void start_free(Rng& rng, Counters& counters, double& g, double& dg);
   double start(const PathStart& known, Rng& rng, Counters& counters);
   double pull(double t) const { return pull_ + (t < pull_end_ ? rows_.known_norm() : 0); }
-  PathGradient gradient(double t, double g, double dg, Rng&) const;
+  PathGradient gradient(double t, double g, double dg, Rng&);
 
  protected:
   // More rows of the line itself than these are not kept in one factor: new ones are then drawn
@@ -51,8 +51,11 @@ class JointLine {
     return p.da[0] * line_.direction.x + p.da[1] * line_.direction.y + p.da[2] * line_.direction.z;
   }
   // To be called before rows at t and behind it are drawn: forgets the oldest ones, goes on to the
-  // conditions that matter there.
+  // conditions that matter there. Whether it will.
+  bool forgets(double t) const;
   void reach(double t, Counters& counters);
+  // Nothing is known of g but on the line itself.
+  bool alone() const { return !posterior_ && !segments_; }
   Functional value_row() const { return {}; }
   Functional slope_row() const { return {0, line_.direction}; }
   // The anchor among the points of the line; null unless lengths vary.

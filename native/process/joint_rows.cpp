@@ -22,7 +22,6 @@ void JointRows::reset(const JointRows& base) {
 
 void JointRows::begin_line(const LineGeometry& line) {
   has_line_ = true;
-  geometry_ = line;
   line_.reset(*covariance_, line);
   for (const Row& row : rows_) line_.add(nullptr, row.at, row.what);
 }
@@ -38,8 +37,10 @@ void JointRows::truncate(int count) {
     if (rows_[i].known) known_norm2_ += xi_[i] * xi_[i];
 }
 
-double JointRows::own(const LocalPoint& at, const Functional& what) const {
+double JointRows::own(const LocalPoint& at, const Functional& what,
+                      const LinePoint* on_line) const {
   if (what.value_only()) return what.value * what.value * covariance_->variance();
+  if (on_line && line_.is_slope(what)) return line_.slope_variance(*on_line);
   return covariance_->between(at, what, at, what);
 }
 
@@ -47,15 +48,8 @@ void JointRows::covariances(const LocalPoint& at, const Functional& what,
                             const LinePoint* on_line) {
   const int n = active();
   if (next_.size() < n) next_.resize(2 * n + 16);
-  const Vec3 off = what.slope - geometry_.direction;
-  const bool value = on_line && what.value_only() && what.value == 1;
-  const bool slope = on_line && what.value == 0 && off.x == 0 && off.y == 0 && off.z == 0;
-  if (value) {
-    line_.covariances(*on_line, base_, n, next_.data());
-  } else if (slope) {
-    if (unused_.size() < n) unused_.resize(next_.size());
-    line_.covariances(*on_line, base_, n, unused_.data(), next_.data());
-  }
+  const bool value = on_line && line_.is_value(what), slope = on_line && line_.is_slope(what);
+  if (value || slope) line_.covariances(*on_line, slope, base_, n, next_.data());
   for (int i = 0; i < n; ++i)
     if (!((value || slope) && row(i).on_line))
       next_[i] = covariance_->between(at, what, row(i).at, row(i).what);
@@ -85,7 +79,7 @@ void JointRows::append(const Row& row, double pivot, double xi) {
 
 JointRows::Known JointRows::add_known(const LocalPoint& at, const Functional& what, double value,
                                       double noise, Counters& counters, const LinePoint* on_line) {
-  const double variance = own(at, what) + noise;
+  const double variance = own(at, what, on_line) + noise;
   double mean;
   const double pivot = border(at, what, variance, mean, on_line);
   const Known known{std::sqrt(variance), pivot / variance, value - mean};
@@ -101,7 +95,7 @@ JointRows::Known JointRows::add_known(const LocalPoint& at, const Functional& wh
 
 double JointRows::add_free(const LocalPoint& at, const Functional& what, Rng& rng,
                            Counters& counters, double jitter, const LinePoint* on_line) {
-  const double variance = (1 + jitter) * own(at, what);
+  const double variance = (1 + jitter) * own(at, what, on_line);
   double mean;
   const double pivot = border(at, what, variance, mean, on_line);
   if (!(pivot > kDrawnPivot * variance)) {
@@ -135,9 +129,10 @@ void JointRows::rebase(const JointRows& base, int last) {
     row.copied = true;
     LinePoint point;
     if (row.on_line) point = line_.point(first_kept + i);
-    const double variance = own(row.at, row.what) + row.noise;
+    const LinePoint* on_line = row.on_line ? &point : nullptr;
+    const double variance = own(row.at, row.what, on_line) + row.noise;
     double mean;
-    const double pivot = border(row.at, row.what, variance, mean, row.on_line ? &point : nullptr);
+    const double pivot = border(row.at, row.what, variance, mean, on_line);
     if (!(pivot > (row.known ? kPivot : kDrawnPivot) * variance)) continue;
     append(row, pivot, (row.value - mean) / std::sqrt(pivot));
     if (has_line_) line_.add_copy(first_kept + i);
@@ -170,16 +165,38 @@ std::vector<double> JointRows::whiten(const std::vector<double>& values) const {
 
 void JointRows::law(const LocalPoint& at, Eigen::Vector4d& mean,
                     Eigen::Matrix4d& covariance) const {
-  const int n = active();
-  Eigen::Matrix<double, 4, Eigen::Dynamic> v(4, n);
+  Crosses crosses(4, active());
+  for (int i = 0; i < active(); ++i)
+    crosses.col(i) = covariance_->cross(at, row(i).at, row(i).what);
+  law(std::move(crosses), at, mean, covariance);
+}
+
+void JointRows::law(const LocalPoint& at, const LinePoint& on_line, Eigen::Vector4d& mean,
+                    Eigen::Matrix4d& covariance) {
+  const LineRows::Gradient of_points = line_.gradient(on_line, at);
+  Crosses crosses(4, active());
+  for (int i = 0; i < active(); ++i) {
+    Eigen::Vector4d c;
+    if (!line_.cross(of_points, base_ + i, c)) c = covariance_->cross(at, row(i).at, row(i).what);
+    crosses.col(i) = c;
+  }
+  law(std::move(crosses), at, mean, covariance);
+}
+
+void JointRows::law(Crosses v, const LocalPoint& at, Eigen::Vector4d& mean,
+                    Eigen::Matrix4d& covariance) const {
   mean.setZero();
   covariance = covariance_->block(at, at);
-  for (int i = 0; i < n; ++i) {
-    const Eigen::Vector4d c = covariance_->cross(at, row(i).at, row(i).what);
-    v.col(i) = (c - v.leftCols(i) * factor_row(i)) / diagonal(i);
+  for (int i = 0; i < active(); ++i) {
+    v.col(i) = (v.col(i) - v.leftCols(i) * factor_row(i)).eval() / diagonal(i);
     mean += v.col(i) * xi_[static_cast<std::size_t>(i)];
   }
   covariance -= v * v.transpose();
+}
+
+double JointRows::variance_left(const LocalPoint& at, const LinePoint* on_line) {
+  double mean;
+  return border(at, {}, covariance_->variance(), mean, on_line);
 }
 
 JointRows::Mean JointRows::mean() const {
@@ -187,7 +204,7 @@ JointRows::Mean JointRows::mean() const {
   out.first_row = base_;
   out.weights = weights(xi_);
   if (!has_line_) return out;
-  out.slopes = line_.weighted(base_, out.weights);
+  line_.weigh(base_, out.weights, out.on_line);
   out.elsewhere = active() > 0 && !row(0).on_line;  // they come first
   return out;
 }

@@ -22,8 +22,8 @@ class JointRows {
   void reset(const Covariance& covariance);
   // Starts with the rows of another: solved once, used by many.
   void reset(const JointRows& base);
-  // Rows from now on may lie on this line, whose covariances are cheaper (length scales that vary
-  // alone): to be called after a reset, with all rows elsewhere.
+  // Rows from now on may lie on this line, where covariances cost less (under an anisotropy alone);
+  // those there are lie elsewhere.
   void begin_line(const LineGeometry& line);
   bool has_line() const { return has_line_; }
   const LineRows& line() const { return line_; }
@@ -50,8 +50,12 @@ class JointRows {
   // From now on rows are drawn given those of `base` and the `last` active rows alone.
   void rebase(const JointRows& base, int last);
 
-  // Law of (g, ∇g) at a point, given the active rows.
+  // Law of (g, ∇g) at a point, given the active rows; `on_line` as above.
   void law(const LocalPoint& at, Eigen::Vector4d& mean, Eigen::Matrix4d& covariance) const;
+  void law(const LocalPoint& at, const LinePoint& on_line, Eigen::Vector4d& mean,
+           Eigen::Matrix4d& covariance);
+  // Variance that they leave to the value there.
+  double variance_left(const LocalPoint& at, const LinePoint* on_line);
 
   // A functional in units of the active rows' independent parts: its covariance with what they
   // leave of another is the prior's less the product of both; its mean is the product with
@@ -80,17 +84,17 @@ class JointRows {
   struct Mean {
     int first_row = 0;
     std::vector<double> weights;
-    std::vector<LineRows::Slopes> slopes;  // of rows on the line
-    bool elsewhere = true;                 // some rows are not on it
+    LineRows::Weights on_line;  // the same of rows on the line
+    bool elsewhere = true;      // some rows are not on it
   };
   Mean mean() const;
   // That mean and its slope along d; `da` is ∂_d A.
   void evaluate(const Mean& mean, const LocalPoint& at, const Vec3& d, const SymMat3& da, double& g,
                 double& dg) const;
   // The same of rows that are all on the line.
-  void evaluate(const Mean& mean, const LinePoint& at, double& g, double& dg) const {
+  void evaluate(const Mean& mean, const LinePoint& at, double& g, double& dg) {
     g = dg = 0;
-    line_.sum(at, mean.first_row, mean.weights, mean.slopes, g, dg);
+    line_.sum(at, mean.on_line, g, dg);
   }
 
   // Norm, in the space of the kernel, of the mean that the known rows make: it exceeds the mean
@@ -120,9 +124,12 @@ class JointRows {
   // and the variance.
   double border(const LocalPoint& at, const Functional& what, double own, double& mean,
                 const LinePoint* on_line);
+  using Crosses = Eigen::Matrix<double, 4, Eigen::Dynamic>;  // of (g, ∇g) with the active rows
+  void law(Crosses crosses, const LocalPoint& at, Eigen::Vector4d& mean,
+           Eigen::Matrix4d& covariance) const;
   // Covariances with the active rows, into next_.
   void covariances(const LocalPoint& at, const Functional& what, const LinePoint* on_line);
-  double own(const LocalPoint& at, const Functional& what) const;
+  double own(const LocalPoint& at, const Functional& what, const LinePoint* on_line) const;
   void append(const Row& row, double pivot, double xi);
 
   const Covariance* covariance_ = nullptr;
@@ -130,9 +137,8 @@ class JointRows {
   int base_ = 0;
   std::vector<double> factor_;  // packed lower triangle, row by row
   std::vector<double> xi_;      // whitened values
-  Eigen::VectorXd next_, unused_;
+  Eigen::VectorXd next_;
   LineRows line_;  // its rows are those of rows_
-  LineGeometry geometry_;
   bool has_line_ = false;
   double known_norm2_ = 0;
 };

@@ -1,8 +1,7 @@
 // Covariances between points of one line where squared length scales A(x) vary (formulas C10 along
 // the line): what the joint samplers spend their time on. With the line as the third axis and
 // S = (A_x + A_y)/2 = L diag(s) Lᵀ, all that a covariance takes is s: Q = (x - y)²/s₃ and
-// |S| = s₁s₂s₃. Values at many points are held in arrays, one for each number, and worked off two
-// or more at a time.
+// |S| = s₁s₂s₃. Points are held in arrays, one for each number, and worked off several at a time.
 #pragma once
 
 #include <array>
@@ -27,57 +26,92 @@ class LineRows {
   LinePoint at(double t) const { return at(t, t); }
   // With the derivative of A at `side` (see TensorField::along).
   LinePoint at(double t, double side) const;
+  LinePoint at(double t, const LocalPoint& same) const;
+  // The same point as others need it to whom it is a value.
+  LocalPoint local(const LinePoint& p) const;
   // Shortest length, in t, over which g changes at a point: 1/ℓ² = dᵀA⁻¹d + ⅛ tr((A⁻¹∂A)²)
   // (definitions E3).
   double length_scale(const LinePoint& p) const;
 
-  int count() const { return static_cast<int>(t_.size()); }
-  void truncate(int count);
-  // A row: its point on the line (null: it lies elsewhere, and its covariances come out as 0), and
-  // with the derivatives of A, in object axes, unless it is a value.
+  // Variance of the slope per t there.
+  double slope_variance(const LinePoint& p) const;
+
+  // A value of g, its slope per t, or another functional, at a point of the line; null: it lies
+  // elsewhere. `local` is needed where it is another functional.
   void add(const LinePoint* point, const LocalPoint& local, const Functional& what);
   void add_copy(int row);
-  // Where a row lies; with the derivative of A if it is not a value.
+  void truncate(int count);
+  // Where a row lies that is on the line.
   LinePoint point(int row) const;
-  // The same as others need it to whom it is a value.
-  LocalPoint local(const LinePoint& p) const;
+  bool is_value(const Functional& what) const { return what.value_only() && what.value == 1; }
+  bool is_slope(const Functional& what) const {
+    const Vec3 off = what.slope - direction_;
+    return what.value == 0 && off.x == 0 && off.y == 0 && off.z == 0;
+  }
 
-  // Of values and of slopes per t at x with the rows from `first` on.
-  void covariances(const LinePoint& x, int first, int count, double* of_value) const;
-  void covariances(const LinePoint& x, int first, int count, double* of_value,
-                   double* of_slope) const;
+  // Of the value, or the slope per t, at x with `count` rows from `first` on; 0 for those
+  // elsewhere.
+  void covariances(const LinePoint& x, bool slope, int first, int count, double* out);
+  // Of (g, ∇g) at x with a value or slope among them: false for others.
+  struct Gradient {
+    std::vector<Eigen::Vector4d> with_value, with_slope;  // of points
+  };
+  bool cross(const Gradient& of_points, int row, Eigen::Vector4d& out) const;
+  Gradient gradient(const LinePoint& x, const LocalPoint& same);
 
-  // Σ weight · row over the rows from `first` on, as the mean of g takes it: rows of slopes at one
-  // point are one.
-  struct Slopes {
-    int row;
+  // Functionals but values and slopes.
+  struct Other {
     LinePoint at;
     double value;
     Vec3 slope;          // axes of the line
     SymMat3 half_along;  // ½ ∂A along it
     double root_slope;   // ¼ tr(A⁻¹ ∂A)
   };
-  std::vector<Slopes> weighted(int first, const std::vector<double>& weights) const;
-  void sum(const LinePoint& x, int first, const std::vector<double>& weights,
-           const std::vector<Slopes>& slopes, double& g, double& dg) const;
+  // Σ weight · row over the rows from `first` on, by points.
+  struct Weights {
+    int first_point = 0;
+    std::vector<double> value, slope;
+    std::vector<Other> others;  // those of one point are one
+  };
+  void weigh(int first, const std::vector<double>& weights, Weights& out) const;
+  // What they sum to at x, and the slope of that per t.
+  void sum(const LinePoint& x, const Weights& weights, double& g, double& dg);
 
  private:
-  static constexpr int kChunk = 32;
-  using Chunk = std::array<double, kChunk>;
+  // A⁻¹ along the line, and tr((A⁻¹∂A)²).
+  static void lengths(const LinePoint& p, double& inverse_a, double& changes);
+  enum class Kind { elsewhere, value, slope, other };
+  struct Row {
+    Kind kind;
+    int index;  // of its point, or among the others
+  };
+  // Numbers of a point: t, |A|^¼, the derivative of its logarithm, A/2 and its derivative.
+  static constexpr int kNumbers = 15;
+  // Covariances of the value at x with those at points, ∂ of them per unit of the line, by x, y and
+  // both.
+  struct Columns {
+    std::vector<double> k, by_x, by_y, by_both;
+    void resize(int n);
+  };
 
-  // Rows first … first + n - 1, n <= kChunk.
-  template <bool with_slope>
-  void chunk(const LinePoint& x, int first, int n, double* of_value, double* of_slope) const;
-  void with(const LinePoint& x, const Slopes& y, double& of_value, double& of_slope) const;
-  void push(const LinePoint& p, double root);
+  int points() const { return static_cast<int>(numbers_[0].size()); }
+  void columns(const LinePoint& x, int begin, int end);
+  Other other(const LinePoint& at, const LocalPoint& local, const Functional& what) const;
+  LinePoint point_at(int index) const;
+  void with(const LinePoint& x, const Other& y, double& of_value, double& of_slope) const;
 
   const Covariance* covariance_ = nullptr;
   Vec3 origin_, direction_;
   double speed_ = 1;
   Mat3 axes_;
-  std::vector<double> t_, root_;          // root 0: not a value on the line
-  std::array<std::vector<double>, 6> a_;  // A/2
-  std::vector<Slopes> slopes_;            // in order of their rows
+  std::vector<Row> rows_;
+  std::array<std::vector<double>, kNumbers> numbers_;
+  std::vector<Other> others_;
+
+  // Of the x asked for last, with the points from columns_begin_ to columns_end_.
+  Columns columns_;
+  LinePoint columns_of_;
+  int columns_begin_ = 0, columns_end_ = -1;
 };
 
 }  // namespace gpis

@@ -42,7 +42,7 @@ NystromPath::Plan::Plan(const GaussianProcess& process, const Box3& bounds)
   }
   // |implied - exact covariance| is at most the variance that the nodes leave, here on lines
   // through the bounds; closer nodes until it is small.
-  for (;; spacing *= 0.8) {
+  for (;; spacing *= 0.85) {
     correlation_error = 0;
     for (const SurveyLine& line : survey_lines(covariance, bounds)) {
       NystromPath path;
@@ -51,19 +51,17 @@ NystromPath::Plan::Plan(const GaussianProcess& process, const Box3& bounds)
       double g, dg;
       path.reset(*this, line.geometry, 0, line.end, counters);
       path.start_free(rng, counters, g, dg);
-      while (path.nodes_[path.end_].t < line.end) {
-        const std::size_t begin = path.end_;
+      while (path.nodes_.back().t < line.end) {
         path.extend(rng, counters);
-        for (std::size_t i = begin; i < path.end_; ++i) {
-          Eigen::Vector4d mean;
-          Eigen::Matrix4d law;
-          const double t = 0.5 * (path.nodes_[i].t + path.nodes_[i + 1].t);
-          path.rows_.law(path.point(t), mean, law);
-          correlation_error = std::max(correlation_error, law(0, 0) / covariance.variance());
-        }
+        const double t = 0.5 * (path.intervals_.back().begin + path.intervals_.back().end);
+        if (!std::isfinite(t)) continue;
+        const Node middle = path.node(t);
+        const double left =
+            path.rows_.variance_left(path.point(t), path.varies() ? &middle.at : nullptr);
+        correlation_error = std::max(correlation_error, left / covariance.variance());
       }
     }
-    if (correlation_error < 2e-4 || spacing < 0.2) break;
+    if (correlation_error < 2e-4 || spacing < 0.3) break;
   }
 }
 
@@ -75,7 +73,6 @@ void NystromPath::reset(const Plan& plan, const LineGeometry& line, double ancho
   step_ = varies() ? plan_step(t_end) : survey_step(*covariance_, line, anchor, t_end);
   margin_ = -1;
   enter(anchor, anchor);
-  begin_run(anchor);
 }
 
 // The spacing of nodes at the shortest length scale near the anchor: where others follow, nodes and
@@ -83,7 +80,7 @@ void NystromPath::reset(const Plan& plan, const LineGeometry& line, double ancho
 double NystromPath::plan_step(double t_end) const {
   const LineRows& line = rows_.line();
   double shortest = line.length_scale(*line_anchor());
-  for (const double lengths : {1.5, 4.0}) {
+  for (const double lengths : {1.0, 3.0}) {
     const double t = anchor_ + lengths * shortest;
     if (t < t_end) shortest = std::min(shortest, line.length_scale(line.at(t)));
   }
@@ -101,70 +98,84 @@ NystromPath::Node NystromPath::node(double t) const {
   return out;
 }
 
-void NystromPath::begin_run(double t) {
-  nodes_.assign(1, node(t));
-  end_ = 0;
-  if (t == anchor_) blocks_.clear();
+void NystromPath::begin_at_anchor(double g, double dg) {
+  nodes_.assign(1, node(anchor_));
+  nodes_[0].g = g;
+  nodes_[0].dg = dg;
+  intervals_.clear();
+  means_.clear();
 }
 
 void NystromPath::start_free(Rng& rng, Counters& counters, double& g, double& dg) {
   JointLine::start_free(rng, counters, g, dg);
-  begin_run(anchor_);
+  begin_at_anchor(g, dg);
 }
 
 double NystromPath::start(const PathStart& known, Rng& rng, Counters& counters) {
   const double slope = JointLine::start(known, rng, counters);
-  begin_run(anchor_);
+  begin_at_anchor(known.value, slope);
   return slope;
 }
 
-// As far as the lengths at both allow. Where lengths vary, on the ends and middles of cells if
-// these are no farther apart: what is known at a node serves the march too.
+// As far as the lengths at both allow, and the kinks between: where A has sharp ones, as along the
+// crease of a fit, lengths may be short between two places where they are long. Where lengths vary,
+// at the ends of cells if these are no farther apart: what is known at a node serves the march too.
 NystromPath::Node NystromPath::after(const Node& last) const {
   const auto farther = [&](double length) {
     const double t = last.t + plan_->spacing * length;
     if (!varies() || t - last.t < (1 - 1e-9) * step_) return t;
-    return anchor_ + 0.5 * std::floor(2 * (t - anchor_) / step_ + 1e-6) * step_;
+    return anchor_ + std::floor((t - anchor_) / step_ + 1e-6) * step_;
   };
   Node next = node(farther(last.length_scale));
   if (next.length_scale < last.length_scale) {
     const double t = farther(next.length_scale);
     if (t < next.t) next = node(t);
   }
+  if (!varies()) return next;
+  for (int i = 0; i < kMostHalvings; ++i) {
+    const double h = next.t - last.t;
+    const double kinks = covariance_->anisotropy()->kinks(
+        line_.origin, line_.direction, last.t + kSliver * h, next.t - kSliver * h);
+    if (kinks * h <= plan_->spacing) break;
+    next = node(last.t + 0.5 * h);
+  }
   return next;
 }
 
-void NystromPath::draw(const Node& at, const Functional& what, Rng& rng, Counters& counters) {
-  reach(at.t, counters);
-  if (!varies())
-    rows_.add_free(point(at.t), what, rng, counters);
-  else
-    rows_.add_free(what.value_only() ? rows_.line().local(at.at) : point(at.t), what, rng, counters,
-                   0, &at.at);
+void NystromPath::draw(Node& at, Rng& rng, Counters& counters) {
+  if (forgets(at.t)) {  // not without the mean of intervals that may still be asked for
+    const int same = static_cast<int>(means_.size());
+    bool needed = false;
+    for (Interval& interval : intervals_)
+      if (interval.mean < 0) {
+        interval.mean = same;
+        needed = true;
+      }
+    if (needed) means_.push_back(rows_.mean());
+    reach(at.t, counters);
+  }
+  const bool value_is_enough = varies() && alone();
+  const LocalPoint local = value_is_enough ? rows_.line().local(at.at) : point(at.t);
+  const LinePoint* on_line = varies() ? &at.at : nullptr;
+  at.g = rows_.add_free(local, value_row(), rng, counters, 0, on_line);
+  at.dg = rows_.add_free(local, slope_row(), rng, counters, 0, on_line);
 }
 
 void NystromPath::extend(Rng& rng, Counters& counters) {
-  const double begin = nodes_[end_].t;
-  for (int i = 0; i < kBlock && (i == 0 || nodes_[end_].t < t_end_); ++i) {
-    ++end_;
-    while (nodes_.size() <= end_ + kBeyond) {
-      nodes_.push_back(after(nodes_.back()));
-      if (std::isfinite(nodes_.back().t)) draw(nodes_.back(), value_row(), rng, counters);
-    }
-  }
+  Node next = after(nodes_.back());
   // At infinity where g is constant along the line.
-  if (std::isfinite(nodes_[end_].t)) draw(nodes_[end_], slope_row(), rng, counters);
-  blocks_.push_back({begin, nodes_[end_].t, rows_.mean()});
+  if (std::isfinite(next.t)) draw(next, rng, counters);
+  intervals_.push_back({nodes_.back().t, next.t});
+  nodes_.push_back(next);
 }
 
 void NystromPath::prepare(long cell, Rng& rng, Counters& counters) {
   const double left = anchor_ + cell * step_, right = std::min(left + step_, t_end_);
-  if (left > nodes_.back().t) {  // a stretch was skipped: a run of its own, given all before it
-    begin_run(left);
-    draw(nodes_[0], value_row(), rng, counters);
-    draw(nodes_[0], slope_row(), rng, counters);
+  if (left > nodes_.back().t) {  // a stretch was skipped: goes on here, given all before it
+    nodes_.push_back(node(left));
+    draw(nodes_.back(), rng, counters);
   }
-  while (nodes_[end_].t < right || blocks_.empty()) extend(rng, counters);
+  while (nodes_.back().t < right || intervals_.empty()) extend(rng, counters);
   if (varies()) {
     // The shortest length scale around the cell.
     double shortest = kInfinity;
@@ -181,20 +192,33 @@ void NystromPath::prepare(long cell, Rng& rng, Counters& counters) {
   }
 }
 
-void NystromPath::evaluate(double t, double& g, double& dg) const {
-  std::size_t block = blocks_.size() - 1;
-  while (block > 0 && t < blocks_[block].begin) --block;
-  const JointRows::Mean& mean = blocks_[block].mean;
-  if (!varies() || mean.elsewhere) {
-    const LocalPoint at = point(t);
-    return rows_.evaluate(mean, at, line_.direction, along(at), g, dg);
+// Later rows change nothing that matters of the mean between nodes that both are among them.
+const JointRows::Mean& NystromPath::mean(Interval& interval) {
+  if (interval.mean < 0) {
+    interval.mean = static_cast<int>(means_.size());
+    means_.push_back(rows_.mean());
   }
-  for (const Node& node : nodes_)
-    if (node.t == t) return rows_.evaluate(mean, node.at, g, dg);
+  return means_[static_cast<std::size_t>(interval.mean)];
+}
+
+void NystromPath::evaluate(double t, double& g, double& dg) {
+  for (std::size_t i = nodes_.size(); i-- > 0 && nodes_[i].t >= t;)
+    if (nodes_[i].t == t) {
+      g = nodes_[i].g;
+      dg = nodes_[i].dg;
+      return;
+    }
+  std::size_t i = intervals_.size() - 1;
+  while (i > 0 && t < intervals_[i].begin) --i;
+  const JointRows::Mean& of = mean(intervals_[i]);
+  if (!varies() || of.elsewhere) {
+    const LocalPoint at = point(t);
+    return rows_.evaluate(of, at, line_.direction, along(at), g, dg);
+  }
   const bool inside = piece_begin_ <= t && t <= piece_end_;
   const double sliver = kSliver * (piece_end_ - piece_begin_);
   const double side = inside ? std::clamp(t, piece_begin_ + sliver, piece_end_ - sliver) : t;
-  rows_.evaluate(mean, rows_.line().at(t, side), g, dg);
+  rows_.evaluate(of, rows_.line().at(t, side), g, dg);
 }
 
 // The cubic is off by the fourth derivative, so by h⁴ of what it is off over a whole cell; and
