@@ -29,8 +29,10 @@ lights: a list of dicts: type "point" | "spot" | "sun" | "area"; name; matrix (s
     power in W, of a sun its irradiance in W/m² | radiance (3,) of an area light; radius 0 (point, spot);
     angle, of a sun's disk (0) or of a spot's whole cone, in radians; blend 0 (spot); size (2,), shape "rectangle" | "ellipse" (area);
     visible_to_camera False (reflections show lights in any case)
-materials: {name: dict}: type "lambert" | "mirror" | "conductor" | "principled"; color (.8, .8, .8), at most 1;
-    roughness .5 (conductor, principled); metallic 0 (principled)
+materials: {name: dict}: type "lambert" | "mirror" | "conductor" | "principled" | "dielectric"; color (.8, .8, .8), at most 1;
+    roughness .5 (conductor, principled); metallic 0 (principled). A dielectric has ior 1.5, its index of refraction in air;
+    roughness 0; color (1, 1, 1), which tints what passes, and reflection (1, 1, 1), which tints what is reflected. The inside of a
+    mesh is where its corners run clockwise; bodies that overlap refract as if the others were not there
 meshes: {name: dict}: vertices (N, 3); triangles (M, 3) integers; normals (N, 3) per vertex or (M, 3, 3) per corner, none: flat;
     material_index (M,), places in the object's list of materials
 objects: a list of dicts: type "mesh" with mesh, its name | "gpis" with process, a GaussianProcess or a CSG tree, memory "renewal+" |

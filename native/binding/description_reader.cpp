@@ -150,19 +150,26 @@ MaterialDescription read_material(const py::handle& value, const std::string& na
   const std::string path = "materials['" + name + "']";
   Reader r(value, path);
   const std::string type = to_text(r.required("type"), r.path_of("type"));
-  if (type == "dielectric" || type == "mix")
+  if (type == "mix")
     refuse(r.path_of("type"),
-           "'" + type +
-               "' is not supported by this version (takes lambert, mirror, conductor, principled)");
+           "'mix' is not supported by this version (takes lambert, mirror, conductor, principled, "
+           "dielectric)");
   MaterialDescription m;
   m.name = name;
   m.type = static_cast<MaterialDescription::Type>(
-      r.choice("type", {"lambert", "mirror", "conductor", "principled"}));
+      r.choice("type", {"lambert", "mirror", "conductor", "principled", "dielectric"}));
+  const bool dielectric = m.type == MaterialDescription::Type::dielectric;
+  if (dielectric) m.color = {1, 1, 1};
   if (r.has("color")) m.color = r.color("color");
   if (m.type == MaterialDescription::Type::conductor ||
       m.type == MaterialDescription::Type::principled)
     m.roughness = r.number("roughness", 0.5);
   if (m.type == MaterialDescription::Type::principled) m.metallic = r.number("metallic", 0);
+  if (dielectric) {
+    m.ior = r.number("ior", m.ior);
+    m.roughness = r.number("roughness", 0);
+    if (r.has("reflection")) m.reflection = r.color("reflection");
+  }
   r.finish("a " + type + " material");
   return m;
 }

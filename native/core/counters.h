@@ -12,6 +12,8 @@
   X(states_inside,                                                                           \
     "processes found inside where another surface was hit (a missed root): forgotten there") \
   X(shadow_rays, "visibility rays towards lights")                                           \
+  X(inside_rays, "rays that travelled inside a stochastic body (dielectrics)")               \
+  X(bounds_exits, "such rays that left a body by its bounds, where it has no surface")       \
   X(mesh_rays, "rays handed to Embree")                                                      \
   X(line_segments, "rays that met an uncertain region of a process")                         \
   X(line_skipped, "rays certain to miss a process: nothing drawn")                           \

@@ -1,5 +1,6 @@
 #include "integrator/path_tracer.h"
 
+#include "integrator/dielectric_scatter.h"
 #include "integrator/scatter.h"
 #include "process/realisation_memory.h"
 #include "process/segment_memory.h"
@@ -30,12 +31,17 @@ using PathMemory = std::vector<std::optional<State>>;
 struct Vertex {
   double t = kInfinity;
   Vec3 position;          // of the surface
-  Vec3 departure;         // where rays start
+  Vec3 departure;         // where rays start that stay on this side
+  Vec3 beyond;            // and those that go through
   Vec3 geometric_normal;  // facing the ray
   Vec3 shading_normal;
   const Material* material = nullptr;
   Color tint = kNoTint;  // the painted albedo there
   int surface = -1;      // which stochastic surface, -1 for a mesh
+  int body = -1;         // and of which object
+  bool inside = false;   // the ray came inside of it
+
+  const Vec3& start(bool transmitted) const { return transmitted ? beyond : departure; }
 };
 
 }  // namespace
@@ -50,17 +56,19 @@ struct PathTracer::Impl {
         memory(scene.stochastic.size()),
         shadow_memory(scene.stochastic.size()),
         realisations(scene.stochastic.size()),
-        segments(scene.stochastic.size()) {
+        segments(scene.stochastic.size()),
+        inside(scene.bodies.size()) {
     for (const auto& body : scene.bodies)
       if (body.surface.leaves().size() > shadow_lines.size())
         shadow_lines.resize(body.surface.leaves().size());
   }
 
   PathSample trace(const Ray& camera_ray, double t_max);
-  TreeHit first_hit(const Scene::Impl::Body& body, Line* body_lines, const Ray& ray, double t_max,
-                    const PathMemory& remembered, std::vector<RealisationMemory>& kept,
-                    Rng& random);
+  TreeHit first_hit(const Scene::Impl::Body& body, bool from_inside, Line* body_lines,
+                    const Ray& ray, double t_max, const PathMemory& remembered,
+                    std::vector<RealisationMemory>& kept, Rng& random);
   bool closest(const Ray& ray, double t_max, Vertex& v);
+  void leave_bounds(const Ray& ray, double t);
   void remember_others(const Vertex& v);
   void keep_segments(const Vertex& v);
   Vec3 draw(const GradientLaw& law) {
@@ -71,7 +79,7 @@ struct PathTracer::Impl {
   SquarePoint point(int decision, Rng& source) const {
     return points->point(kPixelDecision + 1 + bounce * kVertexDecisions + decision, source);
   }
-  bool visible(const Ray& ray, double distance);
+  bool visible(const Ray& ray, double distance, int crossed);
   template <class Scatter, class Remember>
   Color sample_lights(const Vertex& v, const Scatter& scatter, const Remember& remember);
   std::optional<ScatterSample> scatter_at(const Ray& ray, const Vertex& v, Color& direct,
@@ -91,6 +99,10 @@ struct PathTracer::Impl {
   std::vector<RealisationMemory> realisations, shadow_realisations;
   // What it has met, of memory `segments`; shadow rays read it alone.
   std::vector<SegmentMemory> segments;
+  // Of each stochastic body, whether the ray in hand travels inside of it. Every body is a medium
+  // in air: where two overlap, each refracts as if the other were not there (no priorities). The
+  // sides of meshes are told by the order of their corners.
+  std::vector<char> inside;
   const BlockPoints* points = nullptr;
   int bounce = 0;
   Rng* rng = nullptr;
@@ -125,6 +137,7 @@ PathSample PathTracer::Impl::trace(const Ray& camera_ray, double t_max) {
     if (scene.stochastic[i].surface.memory() == Memory::global) realisations[i] = {(*rng)(), {}};
     segments[i].segments.clear();
   }
+  std::fill(inside.begin(), inside.end(), 0);
 
   for (bounce = 0;; ++bounce) {
     Vertex v;
@@ -172,20 +185,23 @@ PathSample PathTracer::Impl::trace(const Ray& camera_ray, double t_max) {
     for (std::size_t i = 0; i < memory.size(); ++i)
       if (memory[i] && met[i] && scene.stochastic[i].surface.memory() == Memory::segments)
         scene.stochastic[i].surface.keep_end(v.position, *memory[i], segments[i]);
-    ray = {v.departure, next->direction};
+    ray = {v.start(next->transmitted), next->direction};
+    if (next->transmitted && v.body >= 0) inside[v.body] = !inside[v.body];
     scatter_pdf = next->pdf;
   }
   return result;
 }
 
-TreeHit PathTracer::Impl::first_hit(const Scene::Impl::Body& body, Line* body_lines, const Ray& ray,
-                                    double t_max, const PathMemory& remembered,
+TreeHit PathTracer::Impl::first_hit(const Scene::Impl::Body& body, bool from_inside,
+                                    Line* body_lines, const Ray& ray, double t_max,
+                                    const PathMemory& remembered,
                                     std::vector<RealisationMemory>& kept, Rng& random) {
   const std::size_t count = body.surface.leaves().size();
+  if (from_inside) ++counters->inside_rays;
   for (std::size_t k = 0; k < count; ++k) {
-    const std::optional<State>& state = remembered[body.first + k];
-    starts[k] = body.surface.leaves()[k].start_from(
-        state ? &*state : nullptr, false, &kept[body.first + k], &segments[body.first + k]);
+    const std::size_t i = body.first + k;
+    const State* state = remembered[i] ? &*remembered[i] : nullptr;
+    starts[k] = body.surface.leaves()[k].start_from(state, from_inside, &kept[i], &segments[i]);
   }
   return body.surface.first_hit(march, {body_lines, count}, ray, t_max, {starts.data(), count},
                                 random, *counters);
@@ -201,21 +217,26 @@ bool PathTracer::Impl::closest(const Ray& ray, double t_max, Vertex& v) {
   const bool hit_mesh =
       scene.triangles && scene.triangles->intersect(ray, nearest, mesh, *counters);
   if (hit_mesh) nearest = mesh.t;
-  for (const auto& body : scene.bodies) {
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    const Scene::Impl::Body& body = scene.bodies[b];
     const auto [enter, leave] = clip(body.surface.bounds(), ray.origin, ray.direction, 0, nearest);
     const bool meets = enter <= leave;
     for (std::size_t k = 0; k < body.surface.leaves().size(); ++k) met[body.first + k] = meets;
     if (!meets) continue;
     const TreeHit hit =
-        first_hit(body, &lines[body.first], ray, nearest, memory, realisations, *rng);
+        first_hit(body, inside[b], &lines[body.first], ray, nearest, memory, realisations, *rng);
     if (!(hit.t < nearest)) continue;
     nearest = hit.t;
     v.surface = static_cast<int>(body.first) + hit.leaf;
+    v.body = static_cast<int>(b);
   }
+  if (scene.transparent) leave_bounds(ray, nearest);
   if (v.surface >= 0) {
     v.t = nearest;
-    v.position = v.departure = ray.at(nearest);
+    v.position = v.departure = v.beyond = ray.at(nearest);
+    v.inside = inside[v.body];
     v.material = scene.stochastic[v.surface].material;
+    if (v.inside) v.material = &v.material->from_inside();
     if (const auto& albedo = scene.stochastic[v.surface].albedo)
       v.tint = albedo->value(scene.stochastic[v.surface].to_object.point(v.position));
     return true;
@@ -227,14 +248,30 @@ bool PathTracer::Impl::closest(const Ray& ray, double t_max, Vertex& v) {
   v.geometric_normal = mesh.geometric_normal * side;
   v.shading_normal = mesh.shading_normal * side;
   v.departure = mesh.position + v.geometric_normal * mesh.offset;
+  v.beyond = mesh.position - v.geometric_normal * mesh.offset;
   v.material = scene.instance_materials[mesh.instance][mesh.material_index];
+  if (side < 0) v.material = &v.material->from_inside();
   return true;
+}
+
+// The ray is inside no more of bodies whose bounds it leaves before t: where there is no surface,
+// no index changes (definitions B4).
+void PathTracer::Impl::leave_bounds(const Ray& ray, double t) {
+  for (std::size_t b = 0; b < inside.size(); ++b) {
+    if (!inside[b]) continue;
+    const auto [enter, leave] =
+        clip(scene.bodies[b].surface.bounds(), ray.origin, ray.direction, 0, t);
+    if (enter <= leave && leave >= t) continue;
+    inside[b] = false;
+    ++counters->bounds_exits;
+  }
 }
 
 // Keeps the state of every leaf that was sampled at the vertex, save the one that was hit
 // (definitions B1); all else is forgotten.
 void PathTracer::Impl::remember_others(const Vertex& v) {
-  for (const auto& body : scene.bodies) {
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    const Scene::Impl::Body& body = scene.bodies[b];
     const ProcessTree& tree = body.surface.tree();
     bool hit = false;
     for (std::size_t k = 0; k < tree.leaves().size(); ++k) {
@@ -250,11 +287,11 @@ void PathTracer::Impl::remember_others(const Vertex& v) {
       const std::optional<State>& state = memory[body.first + k];
       return !state ? 0 : state->value * tree.leaves()[k].sign > 0 ? 1 : -1;
     });
-    const bool inside = !hit && sign < 0;
-    if (inside) ++counters->states_inside;
+    const bool wrong = !hit && (inside[b] ? sign > 0 : sign < 0);
+    if (wrong) ++counters->states_inside;
     for (std::size_t k = 0; k < tree.leaves().size(); ++k) {
       const std::size_t i = body.first + k;
-      if (inside) memory[i].reset();
+      if (wrong) memory[i].reset();
       const ProcessSurface& surface = scene.stochastic[i].surface;
       if (memory[i] && surface.memory() != Memory::renewal)
         memory[i] =
@@ -272,16 +309,19 @@ void PathTracer::Impl::keep_segments(const Vertex& v) {
   }
 }
 
-// Visibility is 0 or 1, a fresh sample of every process under shadow_memory.
-bool PathTracer::Impl::visible(const Ray& ray, double distance) {
+// 0 or 1, a fresh sample of every process under shadow_memory. `crossed`: the body that the ray
+// starts through the surface of, or -1.
+bool PathTracer::Impl::visible(const Ray& ray, double distance, int crossed) {
   ++counters->shadow_rays;
   if (scene.triangles && scene.triangles->occluded(ray, distance, *counters)) return false;
   shadow_realisations = realisations;
-  for (const auto& body : scene.bodies) {
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    const Scene::Impl::Body& body = scene.bodies[b];
     const auto [enter, leave] = clip(body.surface.bounds(), ray.origin, ray.direction, 0, distance);
     if (enter > leave) continue;
-    if (first_hit(body, shadow_lines.data(), ray, distance, shadow_memory, shadow_realisations,
-                  light_rng)
+    const bool from_inside = inside[b] != (static_cast<int>(b) == crossed);
+    if (first_hit(body, from_inside, shadow_lines.data(), ray, distance, shadow_memory,
+                  shadow_realisations, light_rng)
             .t < distance)
       return false;
   }
@@ -302,7 +342,10 @@ Color PathTracer::Impl::sample_lights(const Vertex& v, const Scatter& scatter,
     if (!(max_component(f) > 0)) continue;
     shadow_memory = memory;
     remember(light->direction, shadow_memory);
-    if (!visible({v.departure, light->direction}, light->distance)) continue;
+    const bool transmitted = scatter.transmitted(light->direction);
+    if (!visible({v.start(transmitted), light->direction}, light->distance,
+                 transmitted ? v.body : -1))
+      continue;
     const double weight =
         light->delta() ? 1 : balance(light->pdf, scatter.pdf(light->direction)) / light->pdf;
     sum += f * light->radiance * weight;
@@ -334,13 +377,23 @@ std::optional<ScatterSample> PathTracer::Impl::scatter_at(const Ray& ray, const 
     counters->line_normals += 2;
   }
   memory[v.surface] = surface.state(0, gradient * sign);
-  normal = normalize(gradient);
-  if (v.material->specular() && !law.degenerate) {
-    const MirrorScatter scatter(*v.material, ray.direction, law, v.tint);
-    direct = sample_lights(v, scatter, [&](const Vec3& w, PathMemory& m) {
-      m[v.surface] = surface.state(0, *scatter.gradient_for(w) * sign);
-    });
-    return scatter.sample(gradient);
+  normal = normalize(gradient) * (v.inside ? -1 : 1);
+  if (v.material->specular() && !law.degenerate) {  // normals have a density to light them by
+    const auto lit = [&](const auto& way) {
+      return sample_lights(v, way, [&](const Vec3& w, PathMemory& m) {
+        m[v.surface] = surface.state(0, *way.gradient_for(w) * sign);
+      });
+    };
+    if (v.material->relative_index() == 0) {
+      const MirrorScatter scatter(*v.material, ray.direction, law, v.tint);
+      direct = lit(scatter);
+      return scatter.sample(gradient);
+    }
+    if (DielectricScatter::serves(*v.material)) {
+      const DielectricScatter scatter(*v.material, ray.direction, law, v.tint);
+      direct = lit(scatter.reflection()) + lit(scatter.refraction());
+      return scatter.sample(gradient, point(kDirectionDecision, *rng).u);
+    }
   }
   const SurfaceScatter scatter(*v.material, ray.direction, normal, normal, v.tint);
   if (!scatter.specular()) direct = sample_lights(v, scatter, [](const Vec3&, PathMemory&) {});

@@ -19,8 +19,7 @@ class Conductor final : public Material {
                                        const Color& tint) const override {
     const Vec3 wi = reflect(wo, ggx_.sample_visible(wo, at));
     if (wi.z <= 0) return std::nullopt;
-    return MaterialSample{wi, color_ * tint * ggx_.reflect_weight(wo, wi),
-                          ggx_.reflect_pdf(wo, wi)};
+    return MaterialSample{wi, color_ * tint * ggx_.weight(wo, wi), ggx_.reflect_pdf(wo, wi)};
   }
   Color albedo() const override { return color_; }
 

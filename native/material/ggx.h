@@ -32,6 +32,10 @@ class Ggx {
     return normalize({alpha_ * h.x, alpha_ * h.y, h.z});
   }
 
+  double visible_pdf(const Vec3& wo, const Vec3& h) const {
+    return masking(wo) * std::max(0.0, dot(wo, h)) * distribution(h) / wo.z;
+  }
+
   // Of reflected light: BRDF·cos θ_i without the Fresnel factor, and the density of reflecting
   // about a visible normal.
   double reflect_eval(const Vec3& wo, const Vec3& wi) const {
@@ -42,8 +46,9 @@ class Ggx {
     if (wi.z <= 0) return 0;
     return distribution(normalize(wo + wi)) * masking(wo) / (4 * wo.z);
   }
-  // reflect_eval / reflect_pdf.
-  double reflect_weight(const Vec3& wo, const Vec3& wi) const {
+  // Masking-shadowing of what has been masked: reflect_eval / reflect_pdf, and the same for
+  // refracted light.
+  double weight(const Vec3& wo, const Vec3& wi) const {
     return (1 + lambda(wo)) / (1 + lambda(wo) + lambda(wi));
   }
 

@@ -154,6 +154,8 @@ void check_material(const MaterialDescription& m, const EntryPath& path) {
   check_color(m.color, 1, path + ".color");
   check_between(m.roughness, 0, 1, path + ".roughness");
   check_between(m.metallic, 0, 1, path + ".metallic");
+  check_between(m.ior, 1e-3, 1e3, path + ".ior");
+  check_color(m.reflection, 1, path + ".reflection");
 }
 
 void check_mesh(const MeshDescription& m, const EntryPath& path) {
@@ -195,6 +197,23 @@ void check_resolved(const Affine& m, const std::string& path) {
          "origin.");
 }
 
+// A ray inside of a composed body does not know which operand it is in.
+void check_one_medium(const SceneDescription& d, const ObjectDescription& o,
+                      const std::string& path) {
+  const auto index = [](const MaterialDescription& m) {
+    return m.type == MaterialDescription::Type::dielectric ? m.ior : 0;
+  };
+  const MaterialDescription& first = d.materials[o.materials[0]];
+  for (const int m : o.materials) {
+    const MaterialDescription& other = d.materials[m];
+    if (index(other) == index(first)) continue;
+    fail(
+        path, " mixes '", first.name, "' and '", other.name,
+        "'; the operands of one object are one medium: give all of them dielectrics of one ior, or "
+        "none, and put what differs into an object of its own.");
+  }
+}
+
 void check_object(const SceneDescription& d, const std::vector<double>& farthest_vertex,
                   const ObjectDescription& o, const EntryPath& path) {
   check_transform(o.matrix, path + ".matrix");
@@ -208,6 +227,7 @@ void check_object(const SceneDescription& d, const std::vector<double>& farthest
     if (o.materials.size() != 1 && o.materials.size() != leaves)
       fail(path + ".materials", " has ", o.materials.size(), " entries; a gpis object takes one",
            leaves > 1 ? ", or one for each of its " + std::to_string(leaves) + " operands." : ".");
+    check_one_medium(d, o, path + ".materials");
     return;
   }
   if (o.mesh < 0 || o.mesh >= static_cast<int>(d.meshes.size()))

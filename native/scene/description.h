@@ -66,11 +66,13 @@ struct LightDescription {
 };
 
 struct MaterialDescription {
-  enum class Type { lambert, mirror, conductor, principled } type = Type::lambert;
+  enum class Type { lambert, mirror, conductor, principled, dielectric } type = Type::lambert;
   std::string name;
   Color color{0.8, 0.8, 0.8};
   double roughness = 0;  // Beckmann/GGX alpha = roughness² as in Blender
   double metallic = 0;
+  double ior = 1.5;           // dielectric: index of refraction, that of the surroundings is 1
+  Color reflection{1, 1, 1};  // dielectric: tint of what is reflected; color is of what passes
 };
 
 struct MeshDescription {

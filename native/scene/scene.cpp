@@ -20,6 +20,8 @@ std::unique_ptr<Material> make_material(const MaterialDescription& m) {
       return make_conductor(m.color, m.roughness);
     case Type::principled:
       return make_principled(m.color, m.roughness, m.metallic);
+    case Type::dielectric:
+      return make_dielectric(m.color, m.reflection, m.ior, m.roughness);
   }
   throw std::invalid_argument("materials: unknown type.");
 }
@@ -112,6 +114,10 @@ void Scene::build_objects() {
         impl_->bodies.push_back(
             {static_cast<int>(i), impl_->stochastic.size(),
              TreeSurface(o.process, o.matrix, o.memory, o.sampler, d.settings.missed_root)});
+        if (impl_->materials[o.materials[0]]->relative_index() != 0) {
+          impl_->bodies.back().surface.serve_inside();
+          impl_->transparent = true;
+        }
       } catch (const std::invalid_argument& error) {
         throw std::invalid_argument(EntryPath("objects", i, o.name) + ".process" + ": " +
                                     error.what());
@@ -151,10 +157,17 @@ std::vector<std::pair<std::string, std::string>> Scene::plan() const {
       "scene.light_sampling",
       impl_->lights.groups() > 0
           ? "on: " + std::to_string(impl_->lights.groups()) +
-                " shadow rays at every surface that is not a deterministic mirror"
+                " shadow rays at every surface that is not a deterministic mirror or glass"
       : d.settings.light_sampling
           ? "left out: nothing to sample (a constant world is met by following the BRDF)"
           : "off by settings.light_sampling");
+  std::size_t transparent = 0;
+  for (const auto& b : impl_->bodies)
+    transparent += impl_->stochastic[b.first].material->relative_index() != 0;
+  rows.emplace_back("scene.inside", transparent
+                                        ? "rays travel inside of " + std::to_string(transparent) +
+                                              " dielectric bodies, each a medium in air"
+                                        : "left out: no body is a dielectric");
   rows.emplace_back("scene.world", is_black(d.world)       ? "left out: black"
                                    : d.world.image.empty() ? "constant colour"
                                                            : "image, sampled by brightness");
@@ -176,6 +189,9 @@ std::vector<std::pair<std::string, std::string>> Scene::plan() const {
                                             "Lambert under a dielectric coat (index 1.5) mixed "
                                             "with a metal, single-scatter GGX") +
                                             (smooth ? ", roughness raised to .01" : "");
+    if (m.type == MaterialDescription::Type::dielectric)
+      row = smooth ? "smooth dielectric: exact Fresnel"
+                   : "dielectric: single-scatter GGX, alpha = roughness²";
     if (!row.empty()) rows.emplace_back("materials[" + std::to_string(i) + "].model", row);
   }
   for (std::size_t i = 0; i < d.objects.size(); ++i)

@@ -30,6 +30,7 @@ struct Scene::Impl {
       instance_materials;  // by instance of `triangles`, then material_index
   std::vector<Stochastic> stochastic;
   std::vector<Body> bodies;
+  bool transparent = false;  // rays travel inside some of the bodies
   LightSet lights;
   double radius = 1;  // of the scene's bounding sphere
 };

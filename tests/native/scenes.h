@@ -70,8 +70,8 @@ inline MeshDescription cube_mesh() {
   MeshDescription m;
   for (int k = 0; k < 8; ++k)
     for (int axis = 0; axis < 3; ++axis) m.vertices.push_back(k >> axis & 1 ? 1.f : -1.f);
-  m.triangles = {0, 1, 3, 0, 3, 2, 4, 6, 7, 4, 7, 5, 0, 4, 5, 0, 5, 1,
-                 2, 3, 7, 2, 7, 6, 0, 2, 6, 0, 6, 4, 1, 5, 7, 1, 7, 3};
+  m.triangles = {0, 3, 1, 0, 2, 3, 4, 7, 6, 4, 5, 7, 0, 5, 4, 0, 1, 5,
+                 2, 7, 3, 2, 6, 7, 0, 6, 2, 0, 4, 6, 1, 7, 5, 1, 3, 7};
   return m;
 }
 

@@ -252,3 +252,50 @@ TEST(paths_that_cannot_end_are_counted) {
       2);
   CHECK(r.counters.path_length_limit, ==, 2u);
 }
+
+TEST(glass_slab_passes_what_its_closed_form_says) {
+  // All orders of reflection between two faces: T = (1-F)/(1+F); upper half of the world black,
+  // lower half white. Straight through, at 45 degrees, and totally reflected inside of a prism.
+  SceneDescription s;
+  s.materials = {material(MaterialDescription::Type::dielectric, 1)};
+  set_world_image(s, 8, 64, 0);
+  for (int k = 0; k < 8 * 32 * 3; ++k) s.world.image[k] = 1;
+  s.meshes = {cube_mesh()};
+  Affine flat = placed({}, 1);
+  flat.linear.row[0] = flat.linear.row[0] * 500;
+  flat.linear.row[1] = flat.linear.row[1] * 500;
+  add_mesh_object(s, 0, 0, flat);
+  for (const double cos : {1.0, std::sqrt(0.5), 0.3}) {
+    context() = "cos " + std::to_string(cos);
+    const double ior = s.materials[0].ior, sin = std::sqrt(1 - cos * cos);
+    const double beyond = std::sqrt(1 - sin * sin / (ior * ior));
+    const double across = (cos - ior * beyond) / (cos + ior * beyond),
+                 along = (ior * cos - beyond) / (ior * cos + beyond);
+    const double fresnel = (across * across + along * along) / 2;
+    const Render r = trace(
+        s,
+        [&](Rng&) {
+          return Ray{{0, 0, 5}, {sin, 0, -cos}};
+        },
+        100'000);
+    CHECK(std::abs(r.radiance.z((1 - fresnel) / (1 + fresnel))), <, 4.0);
+  }
+}
+
+TEST(rough_glass_is_lit_alike_by_both_strategies) {
+  SceneDescription s;
+  s.materials = {material(MaterialDescription::Type::dielectric, 0.9, 0.4)};
+  s.lights = {light(LightDescription::Type::point, {1, 0, -3}),
+              light(LightDescription::Type::point, {-1, 1, 3})};
+  s.lights[0].radius = s.lights[1].radius = 1;
+  s.meshes = {sphere_mesh(12, true)};
+  add_mesh_object(s, 0, 0);
+  const auto ray = [](Rng& rng) {
+    return Ray{{0, 0, 4}, normalize(Vec3{0, 0, -4} + any_direction(rng) * 0.8)};
+  };
+  const Render on = trace(s, ray, 60'000, 1);
+  s.settings.light_sampling = false;
+  const Render off = trace(s, ray, 120'000, 2);
+  CHECK(std::abs(on.radiance.z(off.radiance)), <, 4.0);
+  CHECK(on.radiance.error(), <, 0.025 * on.radiance.mean());
+}

@@ -42,6 +42,9 @@ def full():
             "glass": {"type": "mirror", "color": np.ones(3)},
             "gold": {"type": "conductor", "color": (1, 0.8, 0.3), "roughness": 0.2},
             "paint": {"type": "principled", "color": (1, 0, 0), "roughness": 0.5, "metallic": 0.1},
+            "water": {
+                "type": "dielectric", "color": (0.9, 1, 1), "reflection": (1, 1, 1), "ior": 1.33, "roughness": 0.1
+            },
         },
         "meshes": {
             "flat": TRIANGLE | {"material_index": [1]},
@@ -179,7 +182,12 @@ WRONG = [
     ("objects.3.process", {"mean": 1}, "objects[3].process: takes a GaussianProcess or a CSG tree of them, got"),
     # What the format has and this version does not
     ("camera.lens", {"radius": 0.1}, "camera.lens: depth of field is not supported"),
-    ("materials.wood.type", "dielectric", "materials['wood'].type: 'dielectric' is not supported by this version"),
+    ("materials.wood.ior", 1.5, "materials['wood']: unknown key 'ior' (a lambert material takes"),
+    ("materials.water.ior", 0, "materials['water'].ior is 0; give a number from 0.001 to 1000"),
+    ("materials.water.ior", np.nan, "materials['water'].ior"),
+    ("materials.water.roughness", 1.5, "materials['water'].roughness is 1.5; give a number from 0 to 1"),
+    ("materials.water.reflection", (2, 1, 1), "materials['water'].reflection is (2, 1, 1); each entry must be"),
+    ("materials.water.metallic", 1, "materials['water']: unknown key 'metallic' (a dielectric material takes"),
     ("materials.wood.type", "mix", "materials['wood'].type: 'mix' is not supported"),
     ("objects.0.matrix", [(0.0, np.eye(4)), (1.0, np.eye(4))], "objects[0].matrix: motion"),
     ("meshes.flat.uvs", np.ones((3, 2)), "meshes['flat'].uvs: textured meshes are not supported"),
