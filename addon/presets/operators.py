@@ -55,17 +55,18 @@ def material_of(name):
         material.use_nodes = True
     material.diffuse_color = (*preset.color, 1.0)
     material.metallic, material.roughness = preset.metallic, preset.roughness
+    kind = "Principled" if preset.metallic else "Glass" if preset.ior else "Diffuse"
     nodes, links = material.node_tree.nodes, material.node_tree.links
     nodes.clear()
-    kind = "ShaderNodeBsdfPrincipled" if preset.metallic else "ShaderNodeBsdfDiffuse"
-    shader, output = nodes.new(kind), nodes.new("ShaderNodeOutputMaterial")
+    shader, output = nodes.new(f"ShaderNodeBsdf{kind}"), nodes.new("ShaderNodeOutputMaterial")
     output.location = (300, 0)
-    if preset.metallic:
-        shader.inputs["Base Color"].default_value = (*preset.color, 1.0)
-        shader.inputs["Metallic"].default_value = preset.metallic
+    shader.inputs["Base Color" if kind == "Principled" else "Color"].default_value = (*preset.color, 1.0)
+    if kind != "Diffuse":
         shader.inputs["Roughness"].default_value = preset.roughness
-    else:
-        shader.inputs["Color"].default_value = (*preset.color, 1.0)
+    if kind == "Principled":
+        shader.inputs["Metallic"].default_value = preset.metallic
+    if kind == "Glass":
+        shader.inputs["IOR"].default_value = preset.ior
     links.new(shader.outputs[0], output.inputs["Surface"])
     return material
 

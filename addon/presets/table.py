@@ -17,6 +17,7 @@ class Preset:
     color: tuple
     metallic: float = 0.0
     roughness: float = 1.0  # of the micro-BRDF; 1 without metallic is Lambert
+    ior: float | None = None  # of glass
 
 
 def _settings(sigma, length_scale, kernel="SQUARED_EXPONENTIAL", **others):
@@ -50,6 +51,14 @@ PRESETS = {
         (0.93, 0.45, 0.28),
         1.0,
         0.12,
+    ),
+    "FROSTED_GLASS": Preset(
+        "Frosted Glass",
+        "Etched all over: light passes and blurs",
+        _settings(0.002, 0.012),
+        (0.95, 0.98, 0.97),
+        roughness=0.0,
+        ior=1.5,
     ),
     "CHALK": Preset("Chalk", "Dry and powdery", _settings(0.003, 0.008, "MATERN_3_2"), (0.86, 0.85, 0.82)),
     "STONE": Preset("Stone", "Worn and pitted", _settings(0.014, 0.06, "MATERN_3_2"), (0.36, 0.33, 0.29)),

@@ -1,5 +1,5 @@
-"""Material slots -> `materials` of the description: Diffuse, Glossy and Principled nodes. On a GPIS object this is the
-micro-BRDF, the reflection at the surface of one realisation."""
+"""Material slots -> `materials` of the description: Diffuse, Glossy, Glass and Principled nodes. On a GPIS object this is
+the micro-BRDF, what happens to light at the surface of one realisation."""
 
 from . import nodes
 
@@ -55,18 +55,20 @@ def describe(sync, material):
     if convert is None:
         sync.warn(
             f'{owner}: node "{node.name}" is not converted, {DEFAULT["color"][0]} grey is used. The GPIS engine reads '
-            "Diffuse BSDF, Glossy BSDF and Principled BSDF."
+            "Diffuse BSDF, Glossy BSDF, Glass BSDF and Principled BSDF."
         )
         return dict(DEFAULT)
     for socket in node.inputs:
         if socket.name in {"Normal", "Tangent", "Coat Normal"} and socket.is_linked:
             sync.warn(f'{owner}: the link on {socket.name} of node "{node.name}" is not converted.')
     result = convert(sync, owner, node)
-    if not all(0 <= part <= 1 for part in result["color"]):
+    tints = [key for key in ("color", "reflection") if key in result]
+    if not all(0 <= part <= 1 for key in tints for part in result[key]):
         sync.warn(
             f'{owner}: the colour of node "{node.name}" is cut to 0..1, no surface reflects more than it receives.'
         )
-        result["color"] = tuple(min(max(part, 0.0), 1.0) for part in result["color"])
+        for key in tints:
+            result[key] = tuple(min(max(part, 0.0), 1.0) for part in result[key])
     return result
 
 
@@ -86,19 +88,50 @@ def _glossy(sync, owner, node):
     return {"type": "conductor", "color": color, "roughness": roughness}
 
 
-def _principled_node(sync, owner, node):
-    for name in _IGNORED_INPUTS:
-        socket = node.inputs.get(name)
-        if socket is not None and (socket.is_linked or socket.default_value != 0):
-            sync.warn(f'{owner}: {name} of node "{node.name}" is not converted.')
-    if nodes.value(sync, owner, node.inputs["Alpha"]) < 1:
-        sync.warn(f'{owner}: Alpha of node "{node.name}" is not converted, the surface is opaque.')
+def _glass(sync, owner, node):
+    color = nodes.value(sync, owner, node.inputs["Color"])
+    _ignored(sync, owner, node, ("Thin Film Thickness",))
+    return _dielectric(sync, owner, node) | {"color": color, "reflection": color}
+
+
+def _dielectric(sync, owner, node):
+    ior = nodes.value(sync, owner, node.inputs["IOR"])
     return {
-        "type": "principled",
-        "color": nodes.value(sync, owner, node.inputs["Base Color"]),
+        "type": "dielectric",
+        "ior": max(ior, 1e-3),
         "roughness": nodes.value(sync, owner, node.inputs["Roughness"]),
-        "metallic": nodes.value(sync, owner, node.inputs["Metallic"]),
     }
 
 
-_CONVERTERS = {"BSDF_DIFFUSE": _diffuse, "BSDF_GLOSSY": _glossy, "BSDF_PRINCIPLED": _principled_node}
+def _principled_node(sync, owner, node):
+    color = nodes.value(sync, owner, node.inputs["Base Color"])
+    metallic = nodes.value(sync, owner, node.inputs["Metallic"])
+    transmission = node.inputs["Transmission Weight"]
+    glass = not transmission.is_linked and transmission.default_value == 1 and metallic == 0
+    _ignored(sync, owner, node, [name for name in _IGNORED_INPUTS if not (glass and name == transmission.name)])
+    if nodes.value(sync, owner, node.inputs["Alpha"]) < 1:
+        sync.warn(f'{owner}: Alpha of node "{node.name}" is not converted, the surface is opaque.')
+    if glass:
+        # Light that enters and leaves is tinted twice, hence the root.
+        return _dielectric(sync, owner, node) | {"color": tuple(max(part, 0.0) ** 0.5 for part in color)}
+    return {
+        "type": "principled",
+        "color": color,
+        "roughness": nodes.value(sync, owner, node.inputs["Roughness"]),
+        "metallic": metallic,
+    }
+
+
+def _ignored(sync, owner, node, names):
+    for name in names:
+        socket = node.inputs.get(name)
+        if socket is not None and (socket.is_linked or socket.default_value != 0):
+            sync.warn(f'{owner}: {name} of node "{node.name}" is not converted.')
+
+
+_CONVERTERS = {
+    "BSDF_DIFFUSE": _diffuse,
+    "BSDF_GLOSSY": _glossy,
+    "BSDF_GLASS": _glass,
+    "BSDF_PRINCIPLED": _principled_node,
+}

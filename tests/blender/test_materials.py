@@ -1,4 +1,4 @@
-"""Materials: Diffuse, Glossy and Principled nodes give what they give in Cycles; whatever else there is is named."""
+"""Materials: Diffuse, Glossy, Glass and Principled nodes give what they give in Cycles; whatever else there is is named."""
 
 import importlib
 
@@ -16,6 +16,12 @@ MATERIALS = {
     "principled metal": (
         "ShaderNodeBsdfPrincipled",
         {"Base_Color": (0.9, 0.6, 0.3, 1), "Roughness": 0.4, "Metallic": 1.0},
+    ),
+    "glass": ("ShaderNodeBsdfGlass", {"Color": (0.9, 0.7, 0.5, 1), "IOR": 1.5, "Roughness": 0.0}),
+    "rough glass": ("ShaderNodeBsdfGlass", {"Color": (0.9, 0.7, 0.5, 1), "IOR": 1.5, "Roughness": 0.4}),
+    "principled glass": (
+        "ShaderNodeBsdfPrincipled",
+        {"Base_Color": (0.9, 0.6, 0.3, 1), "Roughness": 0.2, "IOR": 1.33, "Transmission_Weight": 1.0},
     ),
 }
 # Cycles scales Principled's diffuse part by the albedo of the lobes above it; ours is one diffuse and one GGX lobe:
@@ -69,13 +75,25 @@ def test_plain_materials_warn_of_nothing(convert):
     assert described["color"] == pytest.approx((0.8, 0.8, 0.8)) and warnings == []
     described, warnings = convert(support.node_material("Metal", "ShaderNodeBsdfPrincipled", Metallic=1.0))
     assert described["type"] == "principled" and described["metallic"] == 1 and warnings == []
+    described, warnings = convert(support.node_material("Window", "ShaderNodeBsdfGlass", IOR=1.6, Roughness=0.25))
+    assert described == {
+        "type": "dielectric",
+        "ior": pytest.approx(1.6),
+        "roughness": 0.25,
+        "color": (1.0, 1.0, 1.0),
+        "reflection": (1.0, 1.0, 1.0),
+    }
+    assert warnings == []
 
 
 @pytest.mark.parametrize(
     "node_type, inputs, word",
     [
         ("ShaderNodeEmission", {}, "is not converted"),
-        ("ShaderNodeBsdfGlass", {}, "is not converted"),
+        ("ShaderNodeBsdfTranslucent", {}, "is not converted"),
+        ("ShaderNodeBsdfGlass", {"Color": (1.5, 0.2, 0.2, 1)}, "cut to 0..1"),
+        ("ShaderNodeBsdfPrincipled", {"Transmission_Weight": 1.0, "Metallic": 0.5}, "Transmission Weight"),
+        ("ShaderNodeBsdfPrincipled", {"Transmission_Weight": 1.0, "Coat_Weight": 0.5}, "Coat Weight"),
         ("ShaderNodeBsdfPrincipled", {"Transmission_Weight": 0.5}, "Transmission Weight"),
         ("ShaderNodeBsdfPrincipled", {"Alpha": 0.5}, "Alpha"),
         ("ShaderNodeBsdfPrincipled", {"Emission_Strength": 2.0}, "Emission Strength"),
@@ -87,7 +105,7 @@ def test_what_is_not_converted_is_named(convert, node_type, inputs, word):
     described, warnings = convert(support.node_material("Odd", node_type, **inputs))
     assert len(warnings) == 1
     assert '"Odd"' in warnings[0] and word in warnings[0]
-    assert all(0 <= part <= 1 for part in described["color"])
+    assert all(0 <= part <= 1 for key in ("color", "reflection") for part in described.get(key, ()))
 
 
 def test_texture_on_a_colour_is_named(convert):
