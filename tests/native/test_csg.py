@@ -317,6 +317,20 @@ def test_a_ray_that_leaves_a_face_at_the_end_of_a_voxel(subtracted, seed):
     assert np.sum(hits["t"] < 1e-6) == 0
 
 
+def test_rays_that_start_inside_wait_until_they_are_out(n, seed):
+    """A remembered value below 0 says inside: no hit before F has been above 0, and then the next."""
+    m, leaf = 2 * n, Leaf(gn.ConstantField(0.1), 0.5, 0.5)
+    tree = gn.union(leaf.process, gn.GaussianProcess(10.0, 0.1, gn.SquaredExponential(0.3)))
+    start = {"value": np.tile([-0.3, np.nan], (m, 1)), "gradient": np.zeros((m, 2, 3))}
+    hits = gn.first_hits(tree, *rays(m), 4, memory="renewal", start=start, seed=seed)
+    assert hits["counters"]["line_entry_inside"] == m
+    below = leaf.values(conditioned(leaf, 0.5, m, np.random.default_rng(seed), np.full(m, -0.4 / 0.5), None)) < 0
+    again = below & ~np.logical_and.accumulate(below, axis=1)
+    t = np.where(again.any(axis=1), X[np.argmax(again, axis=1)] - 0.5 * X[1], np.inf)
+    check_same_distribution(hits["t"], t, "t")
+    assert np.all(hits["gradient"][np.isfinite(hits["t"]), 0] <= 0)
+
+
 def test_start_of_a_fresh_ray_is_joint(n, seed):
     """Formula C7: a camera inside constant media; the signs and values at the start given F > 0."""
     leaves = [Leaf(gn.ConstantField(mu), 1.0, 1.0) for mu in (-0.5, 0.4, -0.2)]
