@@ -52,10 +52,18 @@ class Rng {
   double positive_uniform() { return static_cast<double>(((*this)() >> 11) + 1) * 0x1p-53; }
   // Standard normal.
   double normal() { return Ziggurat::draw(*this); }
-  // As many in a row: the state stays in registers.
+  // As many in a row: the state stays in registers, since only a copy of it is handed on (by its
+  // address, which would keep it in memory) where a number is not accepted at once.
   void normals(double* out, std::size_t count) {
     Rng local = *this;
-    for (std::size_t i = 0; i < count; ++i) out[i] = local.normal();
+    for (std::size_t i = 0; i < count; ++i) {
+      const result_type word = local();
+      if (Ziggurat::accepts(word, out[i])) [[likely]]
+        continue;
+      *this = local;
+      out[i] = Ziggurat::decide(word, out[i], *this);
+      local = *this;
+    }
     *this = local;
   }
 

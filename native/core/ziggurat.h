@@ -14,15 +14,27 @@ class Ziggurat {
  public:
   template <class Generator>
   static double draw(Generator& generator) {
+    double x;
+    const std::uint64_t word = generator();
+    return accepts(word, x) ? x : decide(word, x, generator);
+  }
+
+  // x is the place of a word in its layer: a normal number if this says so, else `decide` has to.
+  static bool accepts(std::uint64_t word, double& x) {
+    const int i = word & (kLayers - 1);
+    // The upper 53 bits, signed.
+    x = static_cast<double>(static_cast<std::int64_t>(word) >> 11) * kTable.scale[i];
+    return std::abs(x) < kTable.inner[i];
+  }
+
+  template <class Generator>
+  [[gnu::noinline]] static double decide(std::uint64_t word, double x, Generator& generator) {
     for (;;) {
-      const std::uint64_t word = generator();
       const int i = word & (kLayers - 1);
-      // The upper 53 bits, signed.
-      const double x = static_cast<double>(static_cast<std::int64_t>(word) >> 11) * kTable.scale[i];
-      if (std::abs(x) < kTable.inner[i]) [[likely]]
-        return x;
       if (i == 0) return std::copysign(tail(generator), x);
       if (under_curve(i, x, generator)) return x;
+      word = generator();
+      if (accepts(word, x)) return x;
     }
   }
 
@@ -62,7 +74,7 @@ class Ziggurat {
 
   // |x| beyond kTail (Marsaglia 1964).
   template <class Generator>
-  [[gnu::noinline]] static double tail(Generator& generator) {
+  static double tail(Generator& generator) {
     for (;;) {
       const double beyond = -std::log(uniform(generator)) / kTail;
       if (-2 * std::log(uniform(generator)) > beyond * beyond) return kTail + beyond;
@@ -70,7 +82,7 @@ class Ziggurat {
   }
 
   template <class Generator>
-  [[gnu::noinline]] static bool under_curve(int i, double x, Generator& generator) {
+  static bool under_curve(int i, double x, Generator& generator) {
     const double low = kTable.height[i], high = kTable.height[i + 1];
     return low + (high - low) * uniform(generator) < std::exp(-0.5 * x * x);
   }
