@@ -9,8 +9,7 @@
 namespace gpis {
 namespace {
 
-// Ends a path that can neither escape nor fade (white walls all around): counted, never reached
-// otherwise.
+// Ends a path that can neither escape nor fade (white walls all around): counted.
 constexpr int kPathLengthLimit = 100'000;
 // Russian roulette starts here; before, nearly every path still matters.
 constexpr int kRouletteStart = 3;
@@ -19,8 +18,7 @@ constexpr int kRouletteStart = 3;
 constexpr int kGradientDecision = 0, kDirectionDecision = 1, kLightDecision = 2;
 constexpr int kVertexDecisions = kLightDecision + LightSet::kMostGroups;
 
-// Where rays may start: Embree would end the program on others. A near plane may lie outside, and a
-// medium without bounds goes on there, unseen.
+// Where rays may start: Embree would end the program on others. A medium without bounds goes on.
 constexpr double kReach = 2 * kFarthest;
 constexpr Box3 kWithinReach{{-kReach, -kReach, -kReach}, {kReach, kReach, kReach}};
 
@@ -87,8 +85,7 @@ struct PathTracer::Impl {
 
   const Scene::Impl& scene;
   const int max_bounces;
-  // The sample path of each stochastic surface along the current ray; `met` tells which were drawn
-  // for it.
+  // The sample path of each stochastic surface along the ray; `met` tells which were drawn for it.
   std::vector<Line> lines;
   std::vector<char> met;
   std::vector<Line> shadow_lines;
@@ -167,8 +164,7 @@ PathSample PathTracer::Impl::trace(const Ray& camera_ray, double t_max) {
     }
     if (!next) break;
     if (!is_finite(next->direction)) {
-      // A gradient without direction. The film leaves the sample out and says so; the path would go
-      // on for ever.
+      // A gradient without direction: the film leaves the sample out and says so.
       result.radiance = {std::nan(""), std::nan(""), std::nan("")};
       break;
     }
