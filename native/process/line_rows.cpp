@@ -205,7 +205,7 @@ void LineRows::columns(const LinePoint& x, int begin, int end) {
   columns_.resize(end - begin);
   while (columns_end_ < end) {
     const int first = columns_end_, n = std::min(kChunk, end - first);
-    double Q[kChunk], psi[kChunk], psi1[kChunk], psi2[kChunk];
+    double Q[kChunk], asked[kChunk], psi[kChunk], psi1[kChunk], psi2[kChunk];
     double N[kChunk], nu_x[kChunk], nu_y[kChunk], nu_xy[kChunk], q_x[kChunk], q_y[kChunk],
         q_xy[kChunk];
     const double* y[kNumbers];
@@ -228,7 +228,8 @@ void LineRows::columns(const LinePoint& x, int begin, int end) {
       q_y[j] = -c * (2 + c * b.bb);
       q_xy[j] = 2 * (c * c * (eb + mb + bb * b.bb) + s.i2 * (c * (a.bb - b.bb) - 1));
     }
-    covariance_->profiles(Q, n, psi, psi1, psi2);
+    std::copy_n(Q, n, asked);  // an address that others know would cost the loop its vectors
+    covariance_->profiles(asked, n, psi, psi1, psi2);
     const int at = first - begin;
     double *k = columns_.k.data() + at, *by_x = columns_.by_x.data() + at,
            *by_y = columns_.by_y.data() + at, *by_both = columns_.by_both.data() + at;
