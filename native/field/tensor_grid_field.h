@@ -37,6 +37,7 @@ class TensorGridField final : public TensorField {
 
   SymMat3 node(const Index3& at) const;
   double kink_at(int axis, const Index3& at) const;
+  double kink_across(int axis, const Place& at, int face) const;
   void check_nodes(const std::function<std::string(const Index3&)>& node_name);
   void find_kinks();
 

@@ -117,6 +117,12 @@ double LineRows::length_scale(const LinePoint& p) const {
   return 1 / (speed_ * std::sqrt(inverse_a * covariance_->shortest_inverse2() + 0.125 * changes));
 }
 
+double LineRows::plain_length_scale(const LinePoint& p) const {
+  double inverse_a, changes;
+  lengths(p, inverse_a, changes);
+  return 1 / (speed_ * std::sqrt(inverse_a * covariance_->shortest_inverse2()));
+}
+
 double LineRows::slope_variance(const LinePoint& p) const {
   double inverse_a, changes;
   lengths(p, inverse_a, changes);

@@ -33,6 +33,8 @@ class LineRows {
   // (definitions E3).
   double length_scale(const LinePoint& p) const;
 
+  // As if A were the same everywhere.
+  double plain_length_scale(const LinePoint& p) const;
   // Variance of the slope per t there.
   double slope_variance(const LinePoint& p) const;
 

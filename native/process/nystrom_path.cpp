@@ -75,14 +75,14 @@ void NystromPath::reset(const Plan& plan, const LineGeometry& line, double ancho
   enter(anchor, anchor);
 }
 
-// The spacing of nodes at the shortest length scale near the anchor: where others follow, nodes and
-// steps come closer by themselves.
+// The spacing of nodes at the shortest length scale near the anchor, but for the changes of A,
+// which may be sudden: where others follow, nodes and steps come closer by themselves.
 double NystromPath::plan_step(double t_end) const {
   const LineRows& line = rows_.line();
-  double shortest = line.length_scale(*line_anchor());
+  double shortest = line.plain_length_scale(*line_anchor());
   for (const double lengths : {1.0, 3.0}) {
     const double t = anchor_ + lengths * shortest;
-    if (t < t_end) shortest = std::min(shortest, line.length_scale(line.at(t)));
+    if (t < t_end) shortest = std::min(shortest, line.plain_length_scale(line.at(t)));
   }
   return plan_->spacing * shortest;
 }
@@ -176,20 +176,10 @@ void NystromPath::prepare(long cell, Rng& rng, Counters& counters) {
     draw(nodes_.back(), rng, counters);
   }
   while (nodes_.back().t < right || intervals_.empty()) extend(rng, counters);
-  if (varies()) {
-    // The shortest length scale around the cell.
-    double shortest = kInfinity;
-    for (std::size_t i = nodes_.size(); i-- > 0;) {
-      if (i > 0 && nodes_[i - 1].t >= right) continue;
-      shortest = std::min(shortest, nodes_[i].length_scale);
-      if (nodes_[i].t <= left) break;
-    }
-    const double s = step_ / shortest;
-    margin_ = (1 + pull(left) / 4.5) * plan_->cubic * (s * s) * (s * s);
-    kink_margin_ = 0.75 * (1 + pull(left) / 4.5);
-  } else if (std::isfinite(step_) && margin_ < 0) {
+  if (varies())
+    margin_ = 1 + pull(left) / 4.5;
+  else if (std::isfinite(step_) && margin_ < 0)
     margin_ = bound_of(deviation_from_cubic(*covariance_, line_, left, step_), pull(left));
-  }
 }
 
 // Later rows change nothing that matters of the mean between nodes that both are among them.
@@ -221,15 +211,24 @@ void NystromPath::evaluate(double t, double& g, double& dg) {
   rows_.evaluate(of, rows_.line().at(t, side), g, dg);
 }
 
-// The cubic is off by the fourth derivative, so by h⁴ of what it is off over a whole cell; and
-// where the slope jumps by J, by at most J h/6.
+// The cubic is off by the fourth derivative, so by h⁴ of what it is off over a whole cell, or by
+// (h/ℓ)⁴ of what it is off over a length scale; and where the slope jumps by J, by at most J h/6.
 double NystromPath::deviation(double a, double h) const {
   if (std::isinf(step_)) return 0;
-  const double s = h / step_, smooth = margin_ * (s * s) * (s * s), sliver = kSliver * h;
-  if (!varies()) return smooth;
-  return smooth + kink_margin_ * h *
-                      covariance_->anisotropy()->kinks(line_.origin, line_.direction, a + sliver,
-                                                       a + h - sliver);
+  if (!varies()) {
+    const double s = h / step_;
+    return margin_ * (s * s) * (s * s);
+  }
+  double shortest = kInfinity;  // of the nodes around
+  for (std::size_t i = nodes_.size(); i-- > 0;) {
+    if (i > 0 && nodes_[i - 1].t >= a + h) continue;
+    shortest = std::min(shortest, nodes_[i].length_scale);
+    if (nodes_[i].t <= a) break;
+  }
+  const double s = h / shortest, sliver = kSliver * h;
+  const double kinks =
+      covariance_->anisotropy()->kinks(line_.origin, line_.direction, a + sliver, a + h - sliver);
+  return margin_ * (plan_->cubic * (s * s) * (s * s) + 0.75 * h * kinks);
 }
 
 std::unique_ptr<LineSampler> make_nystrom(const GaussianProcess& process, const Box3& bounds) {

@@ -66,7 +66,7 @@ class NystromPath : public JointLine {
   std::vector<Node> nodes_;
   std::vector<Interval> intervals_;
   std::vector<JointRows::Mean> means_;
-  double margin_ = 0, kink_margin_ = 0;  // of the cell prepared last, see deviation
+  double margin_ = 0;  // of the cell prepared last, see deviation
   double piece_begin_ = 0, piece_end_ = 0;
 };
 static_assert(LinePath<NystromPath>);
