@@ -164,11 +164,15 @@ def test_sentences(operands, describe, change, sentence):
         describe()
 
 
-def test_fit(operands, describe):
-    """A new Volume with the moments of the composition."""
+def test_fit(operands, describe, tmp_path):
+    """A new Volume with the moments of the composition, that renders like it."""
     a, b, c = operands
+    for obj in operands:  # a fit has one material
+        obj.material_slots[0].material = a.material_slots[0].material
     build(a, ["UNION", "UNION"])
     live, _ = entry_of(describe)
+    bpy.context.scene.gpis.samples = 16
+    live_picture = support.picture(bpy.context.scene, tmp_path)
     assert bpy.ops.gpis.csg_fit(resolution=24, realisations=200, seed=3) == {"FINISHED"}
     fitted = bpy.context.object
     assert fitted.name == "A Fit" and fitted.type == "VOLUME" and fitted.display_type == "BOUNDS"
@@ -185,6 +189,9 @@ def test_fit(operands, describe):
     clear = other[:, 1] - other[:, 0] > 0.4
     assert clear.sum() > 10
     assert np.allclose(entry["process"].mean(points)[clear], other[clear, 0], atol=0.05)
+    picture = support.picture(bpy.context.scene, tmp_path, seed=1)
+    assert np.abs(live_picture - picture).mean() < 0.02  # noise alone: 0.007
+    assert np.allclose(live_picture.mean(axis=(0, 1)), picture.mean(axis=(0, 1)), atol=0.01)
 
 
 def test_fit_of_a_smooth_union_in_closed_form_is_refused(operands):
