@@ -190,7 +190,7 @@ def test_fit(operands, describe, tmp_path):
     assert clear.sum() > 10
     assert np.allclose(entry["process"].mean(points)[clear], other[clear, 0], atol=0.05)
     picture = support.picture(bpy.context.scene, tmp_path, seed=1)
-    assert np.abs(live_picture - picture).mean() < 0.02  # noise alone: 0.007
+    assert np.abs(live_picture - picture).mean() < 0.014  # 0.007 here, 0.024 for the first operand alone
     assert np.allclose(live_picture.mean(axis=(0, 1)), picture.mean(axis=(0, 1)), atol=0.01)
 
 
