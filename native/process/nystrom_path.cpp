@@ -88,7 +88,7 @@ double NystromPath::plan_step(double t_end) const {
 }
 
 NystromPath::Node NystromPath::node(double t) const {
-  Node out{t, {}, 0};
+  Node out{t, {}, kInfinity};
   if (varies()) {
     out.at = t == anchor_ ? *line_anchor() : rows_.line().at(t);
     out.length_scale = rows_.line().length_scale(out.at);
