@@ -39,9 +39,12 @@ void VdbReader::read_descriptors() {
   metadata_.readMeta(stream_);
   for (auto count = readGridCount(stream_); count > 0; --count) {
     Entry entry;
+    const std::streamoff start = stream_.tellg();
     check_texts(3);  // its name, its type, the grid that it is an instance of
     entry.grid = entry.descriptor.read(stream_);
-    entry.descriptor.seekToEnd(stream_);
+    const std::streamoff end = entry.descriptor.getEndPos();
+    if (end <= start || end > size_) throw std::ios_base::failure("end");  // it would not end
+    stream_.seekg(end);
     names_.push_back(printable(entry.descriptor.gridName()));
     entries_.emplace(entry.descriptor.uniqueName(), std::move(entry));
   }

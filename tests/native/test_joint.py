@@ -229,6 +229,16 @@ def test_counters(seed):
     assert gn.first_hits(stationary, origins, directions, 10, seed=seed)["counters"]["factorisations"] == 0
 
 
+@pytest.mark.parametrize("kernel", [gn.PlaneWave([1, 0, 7]), gn.SquaredExponential([0.4, 0.2, np.inf])])
+def test_lines_along_which_g_is_constant(kernel, seed):
+    """The plan looks at lines along the axes; on one of them g has no length scale, and no second node."""
+    gp = gn.GaussianProcess(1.0, 0.5, kernel, bounds=((-1, -1, -1), (1, 1, 1)))
+    along_it = [0, 1.0, 0] if isinstance(kernel, gn.PlaneWave) else [0, 0, 1.0]
+    hits = gn.first_hits(gp, *along(100, along_it), 1, sampler="nystrom", seed=seed)
+    assert hits["counters"]["line_normals"] <= 2 * hits["counters"]["line_segments"] == 200
+    assert np.isinf(hits["t"]).all()  # starts outside, and stays there
+
+
 def test_unsuitable_kernels_get_a_sentence():
     rough = gn.GaussianProcess(0, 1, gn.Matern(1.5, 1), bounds=BOUNDS)
     with pytest.raises(ValueError, match="values at half a length scale do not determine it. Take the sampler 'dense'"):

@@ -256,3 +256,18 @@ def test_a_name_that_is_no_text(tmp_path):
     path = damaged(tmp_path, lambda data: data.replace(b"Tree_float", b"Tree_fl\xffat"))
     with pytest.raises(ValueError, match="Tree_fl[?]at"):
         gn.VdbField(path, "mean")
+
+
+def test_a_grid_that_ends_before_it_begins(tmp_path):
+    """A damaged end sends the reader back, as often as a damaged count says."""
+
+    def change(data):
+        at = data.index(b"Tree_float_5_4_3") + len(b"Tree_float_5_4_3") + 4 + 16  # no parent; two positions
+        first = data.index(b"\x04\x00\x00\x00mean")
+        count = data[first - 4 : first]
+        assert int.from_bytes(count, "little") == 1 and int.from_bytes(data[at : at + 8], "little") == len(data)
+        whole = data[:at] + first.to_bytes(8, "little") + data[at + 8 :]
+        return whole[: first - 4] + (2**31 - 1).to_bytes(4, "little") + whole[first:]
+
+    with pytest.raises(ValueError, match="bad.vdb.*damaged"):
+        gn.VdbField(damaged(tmp_path, change), "mean")
