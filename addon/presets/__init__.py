@@ -1,15 +1,8 @@
 """Presets of GPIS objects, with thumbnails that examples/preset_thumbnails.py renders."""
 
+from ..parts import register_parts_factory
 from . import operators, previews
 
 _PARTS = (previews, operators)
 
-
-def register():
-    for part in _PARTS:
-        part.register()
-
-
-def unregister():
-    for part in reversed(_PARTS):
-        part.unregister()
+register, unregister = register_parts_factory(_PARTS)

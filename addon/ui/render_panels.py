@@ -11,7 +11,7 @@ from .text import wrapped
 ENGINE = "GPIS"
 
 
-class _RenderPanel:
+class PropertiesPanel:
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     bl_context = "render"
@@ -24,13 +24,14 @@ class _RenderPanel:
     def draw(self, context):
         self.layout.use_property_split = True
         self.layout.use_property_decorate = False
-        self.content(self.layout, context.scene)
+        self.content(self.layout, context)
 
 
-class GPIS_PT_sampling(_RenderPanel, bpy.types.Panel):
+class GPIS_PT_sampling(PropertiesPanel, bpy.types.Panel):
     bl_label = "Sampling"
 
-    def content(self, layout, scene):
+    def content(self, layout, context):
+        scene = context.scene
         gpis = scene.gpis
         _switched(layout, gpis, "use_samples", "samples", "Samples")
         _switched(layout, gpis, "use_noise_threshold", "noise_threshold", "Noise Threshold")
@@ -44,21 +45,23 @@ class GPIS_PT_sampling(_RenderPanel, bpy.types.Panel):
             column.prop(scene.render, "threads", text="Number")
 
 
-class GPIS_PT_viewport(_RenderPanel, bpy.types.Panel):
+class GPIS_PT_viewport(PropertiesPanel, bpy.types.Panel):
     bl_label = "Viewport"
     bl_parent_id = "GPIS_PT_sampling"
     bl_options = {"DEFAULT_CLOSED"}
 
-    def content(self, layout, scene):
+    def content(self, layout, context):
+        scene = context.scene
         layout.prop(scene.gpis, "preview_samples", text="Samples")
         layout.prop(scene.gpis, "preview_pixel")
 
 
-class GPIS_PT_light_paths(_RenderPanel, bpy.types.Panel):
+class GPIS_PT_light_paths(PropertiesPanel, bpy.types.Panel):
     bl_label = "Light Paths"
     bl_options = {"DEFAULT_CLOSED"}
 
-    def content(self, layout, scene):
+    def content(self, layout, context):
+        scene = context.scene
         gpis = scene.gpis
         _switched(layout, gpis, "use_max_bounces", "max_bounces", "Bounces")
         layout.prop(gpis, "light_sampling")
@@ -66,20 +69,22 @@ class GPIS_PT_light_paths(_RenderPanel, bpy.types.Panel):
         layout.prop(gpis, "clamp")
 
 
-class GPIS_PT_film(_RenderPanel, bpy.types.Panel):
+class GPIS_PT_film(PropertiesPanel, bpy.types.Panel):
     bl_label = "Film"
     bl_options = {"DEFAULT_CLOSED"}
 
-    def content(self, layout, scene):
+    def content(self, layout, context):
+        scene = context.scene
         layout.prop(scene.gpis, "filter_type")
         layout.prop(scene.gpis, "filter_width")
 
 
-class GPIS_PT_statistics(_RenderPanel, bpy.types.Panel):
+class GPIS_PT_statistics(PropertiesPanel, bpy.types.Panel):
     bl_label = "Statistics"
     bl_options = {"DEFAULT_CLOSED"}
 
-    def content(self, layout, scene):
+    def content(self, layout, context):
+        scene = context.scene
         layout.prop(scene.gpis, "write_statistics")
         entry = statistics.last(scene.name)
         if entry is None:
@@ -98,7 +103,7 @@ class GPIS_PT_statistics(_RenderPanel, bpy.types.Panel):
         layout.operator("gpis.save_statistics", icon="EXPORT")
 
 
-class GPIS_PT_plan(_RenderPanel, bpy.types.Panel):
+class GPIS_PT_plan(PropertiesPanel, bpy.types.Panel):
     """Which sampler serves each object and why, and what the render leaves out"""
 
     bl_label = "Plan"

@@ -3,24 +3,14 @@
 import bpy
 
 from .. import passes
-from .render_panels import ENGINE
+from .render_panels import PropertiesPanel
 
 
-class GPIS_PT_passes(bpy.types.Panel):
+class GPIS_PT_passes(PropertiesPanel, bpy.types.Panel):
     bl_label = "Passes"
-    bl_space_type = "PROPERTIES"
-    bl_region_type = "WINDOW"
     bl_context = "view_layer"
-    COMPAT_ENGINES = {ENGINE}
 
-    @classmethod
-    def poll(cls, context):
-        return context.engine in cls.COMPAT_ENGINES
-
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+    def content(self, layout, context):
         column = layout.column(heading="Include")
         for entry in passes.PASSES:
             if entry.switch:
@@ -28,22 +18,12 @@ class GPIS_PT_passes(bpy.types.Panel):
                 column.prop(owner, entry.switch, text=entry.name)
 
 
-class GPIS_PT_override(bpy.types.Panel):
+class GPIS_PT_override(PropertiesPanel, bpy.types.Panel):
     bl_label = "Override"
-    bl_space_type = "PROPERTIES"
-    bl_region_type = "WINDOW"
     bl_context = "view_layer"
     bl_options = {"DEFAULT_CLOSED"}
-    COMPAT_ENGINES = {ENGINE}
 
-    @classmethod
-    def poll(cls, context):
-        return context.engine in cls.COMPAT_ENGINES
-
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+    def content(self, layout, context):
         layout.prop(context.view_layer, "material_override")
         if hasattr(context.view_layer, "world_override"):  # Blender 5
             layout.prop(context.view_layer, "world_override")

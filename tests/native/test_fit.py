@@ -227,7 +227,7 @@ def test_length_scales_stay_within_the_grid():
 @pytest.mark.stats
 @pytest.mark.parametrize("resolution", [32, 64])
 def test_two_spheres_of_the_paper(resolution, full_size, seed):
-    """Issue 5, 2: the published voxels of the union of two stochastic spheres on the same nodes."""
+    """The published voxels of the union of two stochastic spheres on the same nodes."""
     path = SHARED / f"csg-two-spheres-eval-avg-{resolution}.vdb"
     if not path.exists():
         pytest.skip("the shared data files are not there")
