@@ -176,7 +176,7 @@ void bind_base(py::module_& m) {
     return std::make_shared<SumField>(a, std::make_shared<ConstantField>(b));
   };
   const auto scale = [](const SharedField& a, double s) -> SharedField {
-    return std::make_shared<ScaledField>(a, s);
+    return std::const_pointer_cast<Field>(scaled(a, s));
   };
   py::class_<Field, SharedField>(m, "Field",
                                  R"(A scalar field over space, in its own (object) units.

@@ -8,6 +8,7 @@
 // unbiased and block sums are a fair sample of them.
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 #include "core/rng.h"
@@ -24,21 +25,24 @@ class BlockPoints {
 
   // The sample's point of set number `decision`; `rng` places it inside its box.
   SquarePoint point(int decision, Rng& rng) const {
-    static constexpr unsigned kFirst[4] = {8, 4, 2, 1},
-                              kSecond[4] = {8, 12, 10, 15};  // direction numbers, 4 digits
     const std::uint64_t word = mix64(block_ ^ static_cast<std::uint64_t>(decision));
-    const unsigned place = shuffled(static_cast<unsigned>(index_), word >> 8);
-    unsigned a = word & 15, b = (word >> 4) & 15;
-    for (int digit = 0; digit < 4; ++digit)
-      if (place >> digit & 1) {
-        a ^= kFirst[digit];
-        b ^= kSecond[digit];
-      }
-    const double u = (a + rng.uniform()) / 16;
-    return {u, (b + rng.uniform()) / 16};
+    const unsigned digits =
+        kSobol[shuffled(static_cast<unsigned>(index_), word >> 8)] ^ (word & 0xff);
+    const double u = ((digits & 15) + rng.uniform()) / 16;
+    return {u, ((digits >> 4) + rng.uniform()) / 16};
   }
 
  private:
+  // The points themselves: four digits of the first number, then four of the second.
+  static constexpr std::array<std::uint8_t, 16> kSobol = [] {
+    constexpr unsigned first[4] = {8, 4, 2, 1}, second[4] = {8, 12, 10, 15};  // direction numbers
+    std::array<std::uint8_t, 16> points{};
+    for (unsigned place = 0; place < 16; ++place)
+      for (int digit = 0; digit < 4; ++digit)
+        if (place >> digit & 1) points[place] ^= first[digit] | second[digit] << 4;
+    return points;
+  }();
+
   // A random permutation of 0 … 15: a Feistel network on two halves of two bits.
   static unsigned shuffled(unsigned i, std::uint64_t word) {
     for (int round = 0; round < 4; ++round, word >>= 8)

@@ -20,6 +20,7 @@
   X(line_evaluations, "evaluations of a process on a line")                                  \
   X(line_normals, "normal random numbers drawn for lines and gradients")                     \
   X(line_cells_clear, "stretches of voxels crossed in one step")                             \
+  X(line_pieces_clear, "voxels crossed by the cubic of the path, which was not asked")       \
   X(line_splits, "steps divided because a root could hide in them")                          \
   X(line_step_limit, "lines ended by the bound on steps per ray")                            \
   X(line_entry_inside, "lines found inside on re-entry after a skip")                        \

@@ -44,19 +44,18 @@ class BrickGrid {
            cell[2] / kCells;
   }
   const Brick& brick(std::size_t index) const { return bricks_[index]; }
-  // The corners of a cell in a brick that is not constant: index 4i + 2j + k.
+  // The first corner of a cell in a brick that is not constant; corner 4i + 2j + k is at
+  // corner_offset(i, j), and one further for k.
+  const float* first_corner(const Brick& brick, const Index3& cell) const {
+    return values_.data() + brick.values +
+           ((cell[0] % kCells) * kNodes + cell[1] % kCells) * kNodes + cell[2] % kCells;
+  }
+  static constexpr int corner_offset(int i, int j) { return (i * kNodes + j) * kNodes; }
   void corners(const Brick& brick, const Index3& cell, float out[8]) const {
-    const float* v = values_.data() + brick.values +
-                     ((cell[0] % kCells) * kNodes + cell[1] % kCells) * kNodes + cell[2] % kCells;
-    constexpr int j = kNodes, i = kNodes * kNodes;
-    out[0] = v[0];
-    out[1] = v[1];
-    out[2] = v[j];
-    out[3] = v[j + 1];
-    out[4] = v[i];
-    out[5] = v[i + 1];
-    out[6] = v[i + j];
-    out[7] = v[i + j + 1];
+    const float* v = first_corner(brick, cell);
+    for (int i = 0; i < 2; ++i)
+      for (int j = 0; j < 2; ++j)
+        for (int k = 0; k < 2; ++k) out[4 * i + 2 * j + k] = v[corner_offset(i, j) + k];
   }
 
  private:

@@ -19,7 +19,30 @@ GridField::GridField(std::shared_ptr<const BrickGrid> grid, const Vec3& voxel_si
 }
 
 std::shared_ptr<const GridField> GridField::without_background() const {
-  return std::make_shared<GridField>(grid_, voxel_size_, origin_, std::nullopt);
+  auto out = std::make_shared<GridField>(*this);
+  out->background_.reset();
+  const Range range = grid_->range();
+  out->range_ = factor_ > 0 ? Range{factor_ * range.min, factor_ * range.max}
+                            : Range{factor_ * range.max, factor_ * range.min};
+  return out;
+}
+
+std::shared_ptr<const GridField> GridField::scaled(double factor) const {
+  auto out = std::make_shared<GridField>(*this);
+  out->factor_ *= factor;
+  if (background_) out->background_ = factor * *background_;
+  out->range_ = factor > 0 ? Range{factor * range_.min, factor * range_.max}
+                           : Range{factor * range_.max, factor * range_.min};
+  out->lipschitz_ *= std::abs(factor);
+  return out;
+}
+
+bool GridField::same_lattice(const GridField& other) const {
+  for (int i = 0; i < 3; ++i)
+    if (grid_->nodes()[i] != other.grid_->nodes()[i] || voxel_size_[i] != other.voxel_size_[i] ||
+        origin_[i] != other.origin_[i])
+      return false;
+  return true;
 }
 
 std::optional<Box3> GridField::support() const {
@@ -89,14 +112,14 @@ double GridField::Line::above_until(double t, double t_end, double threshold) co
     }
     const Step& step = locate(t);
     const BrickGrid::Brick& brick = field_->grid_->brick_of(step.cell);
-    if (brick.min > threshold) {
+    if (field_->least(brick) > threshold) {
       t = brick_exit(step);
       continue;
     }
     if (brick.values < 0) return t;
-    float c[8];
-    field_->grid_->corners(brick, step.cell, c);
-    if (!(*std::min_element(c, c + 8) > threshold)) return t;
+    Cell cell;
+    field_->load(step.cell, cell);
+    if (!(*std::min_element(cell.corner, cell.corner + 8) > threshold)) return t;
     t = step.exit;
   }
   return std::min(t, t_end);

@@ -7,6 +7,8 @@
 // nodes are integers.
 #pragma once
 
+#include <Eigen/Core>
+
 #include "field/brick_grid.h"
 
 namespace gpis {
@@ -15,6 +17,8 @@ class GridField final : public Field {
  public:
   GridField(std::shared_ptr<const BrickGrid> grid, const Vec3& voxel_size, const Vec3& origin,
             std::optional<double> background);
+  // The same nodes, their values times a number.
+  std::shared_ptr<const GridField> scaled(double factor) const;
 
   double value(const Vec3& p) const override;
   FieldSample sample(const Vec3& p) const override;
@@ -60,10 +64,15 @@ class GridField final : public Field {
   Place place(const Vec3& x) const;
   // Fills the cell's corners; false if its brick is constant (all corners equal).
   bool load(const Index3& cell, Cell& out) const;
+  double least(const BrickGrid::Brick& brick) const {
+    return factor_ > 0 ? factor_ * brick.min : factor_ * brick.max;
+  }
+  bool same_lattice(const GridField& other) const;
 
   std::shared_ptr<const BrickGrid> grid_;
   Vec3 voxel_size_, origin_;
-  std::optional<double> background_;
+  std::optional<double> background_;  // factor and all
+  double factor_ = 1;                 // of the grid's values
   Range range_;
   double lipschitz_;
 };
@@ -100,12 +109,12 @@ inline GridField::Place GridField::place(const Vec3& x) const {
 inline bool GridField::load(const Index3& cell, Cell& out) const {
   const BrickGrid::Brick& brick = grid_->brick_of(cell);
   if (brick.values < 0) {
-    for (double& c : out.corner) c = brick.min;
+    for (double& c : out.corner) c = factor_ * brick.min;
     return false;
   }
   float c[8];
   grid_->corners(brick, cell, c);
-  for (int i = 0; i < 8; ++i) out.corner[i] = c[i];
+  for (int i = 0; i < 8; ++i) out.corner[i] = factor_ * c[i];
   return true;
 }
 
@@ -120,39 +129,42 @@ class GridField::Line final : public FieldLine {
     return brick.values < 0 ? brick_exit(step) : step.exit;
   }
 
+  // A line of a grid with the same nodes has been located where this one is to be.
+  void follow(const Line& other) { step_ = other.step_; }
+  bool can_follow(const Line& other) const { return field_->same_lattice(*other.field_); }
+
   // The trilinear cell as a cubic in s = t - middle.
   void enter(double a, double b) override {
     middle_ = std::isfinite(b) ? (a + b) / 2 : a + std::max(unit_, std::abs(a));
-    const Place place = field_->place(at(middle_));
-    local_ = place.local;
-    if (field_->background_ && place.any_outside()) {
-      for (double& c : cell_.corner) c = *field_->background_;
-      set_constant(*field_->background_);
-      return;
-    }
-    if (!field_->load(place.cell, cell_)) {
-      set_constant(cell_.corner[0]);
-      return;
-    }
-    for (int i = 0; i < 3; ++i) {
-      slope_[i] = place.outside[i] ? 0.0 : direction_[i];
-      gradient_scale_[i] = place.outside[i] ? 0.0 : 1 / field_->voxel_size_[i];
-    }
-    // Linear in s along x, quadratic with y, cubic with z.
-    double q[2][3];
-    for (int k = 0; k < 2; ++k) {
-      const double* c = cell_.corner + k;
-      const double d0 = c[4] - c[0], d1 = c[6] - c[2];
-      const double a0 = c[0] + local_.x * d0, a1 = c[2] + local_.x * d1;
-      const double b0 = slope_.x * d0, b1 = slope_.x * d1;
-      q[k][0] = a0 + local_.y * (a1 - a0);
-      q[k][1] = b0 + local_.y * (b1 - b0) + slope_.y * (a1 - a0);
-      q[k][2] = slope_.y * (b1 - b0);
-    }
-    const double e0 = q[1][0] - q[0][0], e1 = q[1][1] - q[0][1], e2 = q[1][2] - q[0][2];
-    cubic_[0] = q[0][0] + local_.z * e0;
-    cubic_[1] = q[0][1] + local_.z * e1 + slope_.z * e0;
-    cubic_[2] = q[0][2] + local_.z * e2 + slope_.z * e1;
+    // The cell that was located last, in nearly all cases.
+    place_ = a == step_.at && b <= step_.exit && a >= box_in_ && b <= box_out_
+                 ? inside(step_.cell, at(middle_))
+                 : field_->place(at(middle_));
+    constant_ = true;
+    if (field_->background_ && place_.any_outside()) return set_constant(*field_->background_);
+    const BrickGrid::Brick& brick = field_->grid_->brick_of(place_.cell);
+    if (brick.values < 0) return set_constant(field_->factor_ * brick.min);
+    constant_ = false;
+    slope_ = direction_;
+    for (int i = 0; i < 3; ++i)
+      if (place_.outside[i]) slope_[i] = 0;
+    // Linear in s along x, quadratic with y, for the two corners along z at once; cubic with z.
+    using Pair = Eigen::Array2d;
+    const float* first = field_->grid_->first_corner(brick, place_.cell);
+    const auto pair = [&](int i, int j) -> Pair {
+      return Eigen::Map<const Eigen::Array2f>(first + BrickGrid::corner_offset(i, j))
+                 .cast<double>() *
+             field_->factor_;
+    };
+    const Vec3& u = place_.local;
+    const Pair c0 = pair(0, 0), c1 = pair(0, 1), d0 = pair(1, 0) - c0, d1 = pair(1, 1) - c1;
+    const Pair a0 = c0 + u.x * d0, rise = c1 + u.x * d1 - a0;
+    const Pair b0 = slope_.x * d0, bend = slope_.x * d1 - b0;
+    const Pair q0 = a0 + u.y * rise, q1 = b0 + u.y * bend + slope_.y * rise, q2 = slope_.y * bend;
+    const double e0 = q0[1] - q0[0], e1 = q1[1] - q1[0], e2 = q2[1] - q2[0];
+    cubic_[0] = q0[0] + u.z * e0;
+    cubic_[1] = q1[0] + u.z * e1 + slope_.z * e0;
+    cubic_[2] = q2[0] + u.z * e2 + slope_.z * e1;
     cubic_[3] = slope_.z * e2;
   }
 
@@ -168,8 +180,12 @@ class GridField::Line final : public FieldLine {
     FieldSample out;
     double derivative;
     evaluate(t, out.value, derivative);
-    const Vec3 g = cell_.gradient(local_ + slope_ * (t - middle_));
-    out.gradient = g * gradient_scale_;
+    if (constant_) return out;
+    Cell cell;
+    field_->load(place_.cell, cell);
+    const Vec3 g = cell.gradient(place_.local + slope_ * (t - middle_));
+    for (int i = 0; i < 3; ++i)
+      out.gradient[i] = place_.outside[i] ? 0.0 : g[i] / field_->voxel_size_[i];
     return out;
   }
 
@@ -183,7 +199,11 @@ class GridField::Line final : public FieldLine {
     Index3 face;  // -1 or nodes() past the last one
     double time[3];
     double exit = -kInfinity;
+    double at = -kInfinity;  // the t that it was located for
   };
+  static Place inside(const Index3& cell, const Vec3& x) {
+    return {cell, {x.x - cell[0], x.y - cell[1], x.z - cell[2]}, {false, false, false}};
+  }
   Vec3 at(double t) const { return anchor_ + direction_ * (t - anchor_t_); }
   double face_time(int axis, int face) const {
     return anchor_t_ + (face - anchor_[axis]) * inverse_[axis];
@@ -192,6 +212,7 @@ class GridField::Line final : public FieldLine {
     return field_->background_ && (t < box_in_ - sliver_ || t >= box_out_ - sliver_);
   }
   const Step& locate(double t) const {
+    if (t == step_.at) return step_;
     if (t != step_.exit) {  // not on from the last step
       const Vec3 x = at(t);
       for (int i = 0; i < 3; ++i) {
@@ -208,6 +229,7 @@ class GridField::Line final : public FieldLine {
     for (int i = 0; i < 3; ++i)
       while (step_.time[i] <= t + sliver_) set_face(i, step_.face[i] + (inverse_[i] > 0 ? 1 : -1));
     step_.exit = std::min({step_.time[0], step_.time[1], step_.time[2]});
+    step_.at = t;
     return step_;
   }
   void set_face(int axis, int face) const {
@@ -236,7 +258,6 @@ class GridField::Line final : public FieldLine {
   void set_constant(double value) {
     cubic_[0] = value;
     cubic_[1] = cubic_[2] = cubic_[3] = 0;
-    slope_ = gradient_scale_ = {};
   }
 
   const GridField* field_;
@@ -244,10 +265,12 @@ class GridField::Line final : public FieldLine {
       inverse_;  // index space; inverse 0: the ray crosses no face along this axis
   double anchor_t_ = 0, unit_, sliver_, box_in_, box_out_;
 
-  Cell cell_;
   mutable Step step_;  // the last one located: where the next one starts from
+  // The piece selected last, in s = t - middle.
   double cubic_[4], middle_ = 0;
-  Vec3 local_, slope_, gradient_scale_;
+  Place place_;
+  Vec3 slope_;
+  bool constant_ = true;
 };
 
 }  // namespace gpis

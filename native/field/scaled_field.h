@@ -3,7 +3,8 @@
 
 #include "field/above.h"
 #include "field/check.h"
-#include "field/field.h"
+#include "field/constant_field.h"
+#include "field/grid_field.h"
 
 namespace gpis {
 
@@ -67,5 +68,16 @@ class ScaledField final : public Field {
   FieldPtr field_;
   double factor_;
 };
+
+// A field times a number, as the simplest field that is that: lines of constants and grids keep
+// their own type and bounds.
+inline FieldPtr scaled(FieldPtr field, double factor) {
+  check_finite("Field * number: the number", factor);
+  if (const auto* constant = dynamic_cast<const ConstantField*>(field.get()))
+    return std::make_shared<ConstantField>(factor * constant->value({}));
+  if (const auto* grid = dynamic_cast<const GridField*>(field.get()); grid && factor != 0)
+    return grid->scaled(factor);
+  return std::make_shared<ScaledField>(std::move(field), factor);
+}
 
 }  // namespace gpis

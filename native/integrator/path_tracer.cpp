@@ -22,6 +22,15 @@ constexpr int kVertexDecisions = kLightDecision + LightSet::kMostGroups;
 constexpr double kReach = 2 * kFarthest;
 constexpr Box3 kWithinReach{{-kReach, -kReach, -kReach}, {kReach, kReach, kReach}};
 
+// The part of a ray within reach. From near the origin, where nearly all rays start, that is a
+// distance which all objects lie in.
+std::pair<double, double> within_reach(const Ray& ray, double t_max) {
+  const Vec3& o = ray.origin;
+  const double far = std::max({std::abs(o.x), std::abs(o.y), std::abs(o.z)});
+  if (far < 1e-3 * kFarthest) return {0, std::min(t_max, 0.99 * kReach)};
+  return clip(kWithinReach, o, ray.direction, 0, t_max);
+}
+
 // What a path knows of each stochastic surface at the point it leaves; nothing: a fresh start
 // outside of it.
 using PathMemory = std::vector<std::optional<State>>;
@@ -103,7 +112,10 @@ struct PathTracer::Impl {
   const BlockPoints* points = nullptr;
   int bounce = 0;
   Rng* rng = nullptr;
-  Rng light_rng{0, 0};  // its own stream: light sampling never changes the path
+  // A stream of its own: light sampling never changes the path. Begun where a light is sampled.
+  Rng light_rng{0, 0};
+  std::uint64_t light_seed = 0;
+  bool light_begun = false;
   Counters* counters = nullptr;
 };
 
@@ -118,7 +130,8 @@ PathSample PathTracer::trace(const Ray& camera_ray, double t_max, const BlockPoi
                              Rng& rng, Counters& counters) {
   impl_->points = &points;
   impl_->rng = &rng;
-  impl_->light_rng = Rng(rng(), 0);
+  impl_->light_seed = rng();
+  impl_->light_begun = false;
   impl_->counters = &counters;
   return impl_->trace(camera_ray, t_max);
 }
@@ -207,7 +220,7 @@ TreeHit PathTracer::Impl::first_hit(const Scene::Impl::Body& body, bool from_ins
 // first hits wins (union of independent processes, definitions B5).
 bool PathTracer::Impl::closest(const Ray& ray, double t_max, Vertex& v) {
   MeshHit mesh;
-  const auto [start, end] = clip(kWithinReach, ray.origin, ray.direction, 0, t_max);
+  const auto [start, end] = within_reach(ray, t_max);
   if (start > 0 || end < 0) return false;
   double nearest = end;
   const bool hit_mesh =
@@ -330,6 +343,8 @@ template <class Scatter, class Remember>
 Color PathTracer::Impl::sample_lights(const Vertex& v, const Scatter& scatter,
                                       const Remember& remember) {
   Color sum;
+  if (!light_begun) light_rng = Rng(light_seed, 0);
+  light_begun = true;
   for (int group = 0; group < scene.lights.groups(); ++group) {
     const SquarePoint at = point(kLightDecision + group, light_rng);
     const std::optional<LightSample> light = scene.lights.sample(group, v.departure, at);

@@ -24,6 +24,13 @@ class DirectLine {
     return line_.above_until(t, t_end, threshold);
   }
   FieldSample sample(double t) const { return line_.sample(t); }
+  // Of another grid with the same nodes: where it is on the ray is where this one is.
+  bool can_follow(const DirectLine& other) const requires requires(const typename F::Line& l) {
+    l.can_follow(l);
+  }
+  { return line_.can_follow(other.line_); }
+  void follow(const DirectLine& other) requires requires(typename F::Line& l) { l.follow(l); }
+  { line_.follow(other.line_); }
 
  private:
   typename F::Line line_;

@@ -11,7 +11,7 @@
 #include "process/bracket.h"
 #include "process/gaussian_process.h"
 #include "process/line_impl.h"
-#include "process/path.h"
+#include "process/path_start.h"
 #include "process/plan.h"
 
 namespace gpis {
@@ -37,6 +37,7 @@ class March {
     mean_deviation_ = 0.05 * speed * curvature * curvature * curvature;
     mean_slope_ = plan.mean_lipschitz * speed;
     sigma_slope_ = plan.sigma_lipschitz * speed;
+    if constexpr (kSameFields) follows_ = sigma_.can_follow(mean_);
   }
 
   // Fills line.hit_* and returns the hit's t, or infinity.
@@ -71,11 +72,15 @@ class March {
       b = step_end(a, t_end);
       last_cell_ = cell_;
       const double whole = std::min(cell_end(), t_end);
-      if (kBreaks && piece_end_ < whole && tried_cell_ != cell_ &&
-          certainly_clear(*from, whole, *to)) {
+      if (kBreaks && piece_end_ < whole && crossed(*from, whole, *to)) {
         b = whole;
         new_piece = true;
       } else {
+        if (from->t != a) {  // some way into the cell
+          a = from->t;
+          b = step_end(a, t_end);
+          new_piece = false;
+        }
         if (Path::kStride > 1 && b == cell_end()) b = stride_end(*from, b, t_end);
         enter(a, b);
         if (new_piece) *from = combine(a, from->g, from->dg);  // same path, fields of the new piece
@@ -116,6 +121,9 @@ class March {
  private:
   static constexpr int kMaxSteps = 1 << 20, kStepsToStop = 1 << 12;
   static constexpr bool kBreaks = MeanLine::kBreaks || SigmaLine::kBreaks;
+  static constexpr bool kSameFields = std::same_as<MeanLine, SigmaLine> && requires(MeanLine & l) {
+    l.follow(l);
+  };
 
   // Derivatives per t.
   struct Point {
@@ -130,6 +138,8 @@ class March {
   double step_end(double a, double t_end) {
     piece_end_ = kInfinity;
     if constexpr (MeanLine::kBreaks) piece_end_ = mean_.next_break(a);
+    if constexpr (kSameFields)
+      if (follows_) sigma_.follow(mean_);
     if constexpr (SigmaLine::kBreaks) piece_end_ = std::min(piece_end_, sigma_.next_break(a));
     const double b = std::min({cell_end(), a + smooth_step_, t_end, piece_end_});
     // Nothing ends the step: a constant path over a mean without curvature. Steps that double end
@@ -161,8 +171,13 @@ class March {
     return plan_.skip_threshold + plan_.sigma_max * path_.pull(t);
   }
 
-  // f = μ + σ g, f' = μ' + gσ' + σ g' (math.md §2).
+  // f = μ + σ g, f' = μ' + gσ' + σ g' (math.md §2), on the path.
   Point combine(double t, double g, double dg) {
+    ++counters_.line_evaluations;
+    return fields(t, g, dg);
+  }
+
+  Point fields(double t, double g, double dg) {
     Point p;
     double dmean;
     mean_.evaluate(t, p.mean, dmean);
@@ -172,7 +187,6 @@ class March {
     p.dg = dg;
     p.f = p.mean + p.sigma * g;
     p.df = dmean + p.dsigma * g + p.sigma * dg;
-    ++counters_.line_evaluations;
     counters_.mean_lookups += MeanLine::kLookups;
     counters_.sigma_lookups += SigmaLine::kLookups;
     return p;
@@ -199,15 +213,25 @@ class March {
     return combine(cell_end(), g, dg);
   }
 
-  // A cell of the path that holds many pieces of the fields (voxels), crossed at once where bounds
-  // show that it holds no root: the mean and the deviation by their steepest slopes, g by its cubic
-  // (see classify). `to` is its far end.
-  bool certainly_clear(const Point& from, double whole, Point& to) {
-    tried_cell_ = cell_;
+  // A cell of the path that holds many pieces of the fields (voxels): crossed at once where bounds
+  // show that it holds no root, else piece by piece as long as each is seen to hold none. `to` is
+  // then its far end; false: `from` is the point where a step has to be taken.
+  bool crossed(Point& from, double whole, Point& to) {
     if (!(from.f > 0)) return false;
-    enter(whole, whole);
-    to = evaluate_end(whole);
-    const double h = whole - from.t;
+    if (tried_cell_ != cell_) {
+      tried_cell_ = cell_;
+      enter(whole, whole);
+      to = evaluate_end(whole);
+      far_g_ = to.g;
+      far_dg_ = to.dg;
+      if (certainly_clear(from, to)) return true;
+    }
+    return from.t + smooth_step_ >= whole && cross_pieces(from, whole, to);
+  }
+
+  // The mean and the deviation by their steepest slopes, g by its cubic (see classify).
+  bool certainly_clear(const Point& from, const Point& to) {
+    const double h = to.t - from.t;
     const double mean = 0.5 * (from.mean + to.mean - mean_slope_ * h);
     const double g = std::min({from.g, to.g, from.g + h / 3 * from.dg, to.g - h / 3 * to.dg}) -
                      deviation_over(path_, from.t, h);
@@ -216,6 +240,39 @@ class March {
     if (!(mean + sigma * g > 0)) return false;
     ++counters_.line_cells_clear;
     return true;
+  }
+
+  // From `from` to the end of the cell g is the cubic through both, up to its deviation: a piece in
+  // which f is positive for all that is crossed without asking the path.
+  bool cross_pieces(Point& from, double whole, Point& to) {
+    const double deviation = deviation_over(path_, from.t, whole - from.t);
+    const Cubic path(from.t, from.g, from.dg, whole, far_g_, far_dg_);
+    double a = from.t, g = from.g, dg = from.dg;
+    for (;;) {
+      const double b = std::min(piece_end_, whole);
+      enter(a, b);
+      Point p = fields(a, g, dg);
+      g = b < whole ? path.value(b) : far_g_;
+      dg = b < whole ? path.slope(b) : far_dg_;
+      to = fields(b, g, dg);
+      // B₁ + B₂ <= ¾ over the cell.
+      const double sigma = std::max(p.sigma, to.sigma) + std::abs(to.dsigma - p.dsigma) * (b - a);
+      Point low = to;
+      p.f -= 0.75 * deviation * sigma;
+      low.f -= 0.75 * deviation * sigma;
+      if (!(p.f > 0) || classify(p, low, 0) != Verdict::none) break;
+      ++counters_.line_pieces_clear;
+      if (b >= whole) return true;
+      a = b;
+      step_end(a, whole);
+      if (to.mean > threshold_at(a)) break;
+    }
+    if (a > from.t) {
+      enter(a, std::min(piece_end_, whole));
+      from = evaluate(a);
+      if (!(from.f > 0)) ++counters_.line_entry_inside;
+    }
+    return false;
   }
 
   // The state at the start (definitions B1-B4).
@@ -239,37 +296,15 @@ class March {
     }
     Point p = combine(a, 0, 0);
     if (p.sigma > 0) {
-      const PathStart known = start_of_path(p, start);
+      const PathStart known =
+          path_start(start, a, p, p.df, 1, line_.geometry.direction, path_, mean_, sigma_, rng_);
       p = combine(a, known.value, path_.start(known, rng_, counters_));
     } else {
       path_.start_free(rng_, counters_, p.g, p.dg);
     }
     p.f = start.state.value;
-    return start.state.value == 0 ? leaving(p) : p;
-  }
-
-  // g and its slope from f and ∇f = ∇μ + g∇σ + σ∇g; `fields` is f where g = 0.
-  PathStart start_of_path(const Point& fields, const Start& start) {
-    PathStart known;
-    known.value = (start.state.value - fields.mean) / fields.sigma;
-    const double without_path = fields.df + known.value * fields.dsigma;
-    if (start.kind == Start::Kind::value_slope) {
-      const Vec3& gradient = start.state.gradient;
-      known.slope_known = known.gradient_known = true;
-      known.slope = (dot(line_.geometry.direction, gradient) - without_path) / fields.sigma;
-      known.gradient = (gradient - mean_.sample(fields.t).gradient -
-                        sigma_.sample(fields.t).gradient * known.value) /
-                       fields.sigma;
-    } else if (start.state.value == 0) {
-      // Flux-weighted (B3); a path that is constant along the line has but one slope.
-      double mean, deviation;
-      path_.slope_law(known.value, mean, deviation);
-      const double m = without_path + fields.sigma * mean, s = fields.sigma * deviation;
-      known.slope_known = true;
-      known.slope =
-          s > 0 ? (s * flux_weighted_normal(m / s, rng_) - without_path) / fields.sigma : mean;
-    }
-    return known;
+    if (p.f < 0) ++counters_.line_entry_inside;
+    return p.f == 0 ? leaving(p) : p;
   }
 
   // A ray that leaves the surface has a positive slope; only rounding at grazing directions can say
@@ -284,6 +319,7 @@ class March {
   }
 
   Verdict classify_step(const Point& a, const Point& b) const {
+    if (rises_through_rounding(a, b, step_)) return Verdict::none;
     const double h = b.t - a.t;
     const double sigma = std::max(a.sigma, b.sigma) + std::abs(b.dsigma - a.dsigma) * h;
     return classify(a, b,
@@ -320,27 +356,9 @@ class March {
     }
   }
 
-  // Newton inside a bracket f(lo) > 0 >= f(hi), first guess from the cubic; evaluates the path
-  // itself, so the root is the path's.
   void refine(const Point& lo, const Point& hi) {
-    double a = lo.t, b = hi.t;
-    const double tolerance = resolution_ + 4e-16 * std::abs(b);
-    double x = cubic_root(lo, hi);
-    Point p = hi;
-    for (int i = 0; i < 80; ++i) {
-      if (!(x > a && x < b)) x = 0.5 * (a + b);
-      p = evaluate(x);
-      (p.f > 0 ? a : b) = x;
-      const double step = -p.f / p.df;
-      if (b - a <= tolerance) break;
-      if (p.df < 0 && std::abs(step) <= Path::kLastStep * step_ + tolerance) {
-        // Newton's error is the square of its step: nothing is left to evaluate.
-        p.t += step;
-        p.g += step * p.dg;
-        break;
-      }
-      x = i < 40 && p.df < 0 ? x + step : 0.5 * (a + b);
-    }
+    const Point p = refine_root(lo, hi, resolution_ + 4e-16 * std::abs(hi.t),
+                                Path::kLastStep * step_, [&](double t) { return evaluate(t); });
     line_.hit_t = p.t;
     line_.hit_g = p.g;
     line_.hit_dg = p.dg;
@@ -363,6 +381,8 @@ class March {
   double mean_slope_, sigma_slope_;                  // upper bounds per t
   double piece_end_ = kInfinity;                     // where the smooth piece of the fields ends
   double smooth_step_, mean_deviation_;
+  double far_g_ = 0, far_dg_ = 0;     // at the end of the cell that was tried
+  bool follows_ = false;              // the deviation's grid has the nodes of the mean's
   double step_ = 1, resolution_ = 0;  // of the path's cells, of a root
 };
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "field/check.h"
-#include "field/constant_field.h"
 #include "field/scaled_field.h"
 #include "kernel/scaled_kernel.h"
 #include "process/conditioned_sampler.h"
@@ -23,11 +22,7 @@ std::shared_ptr<const GaussianProcess> normalised(std::shared_ptr<const Gaussian
   const double variance = process->kernel->variance();
   if (variance == 1) return process;
   auto out = std::make_shared<GaussianProcess>(*process);
-  const double factor = std::sqrt(variance);
-  if (const auto* constant = dynamic_cast<const ConstantField*>(process->sigma.get()))
-    out->sigma = std::make_shared<ConstantField>(factor * constant->value({}));
-  else
-    out->sigma = std::make_shared<ScaledField>(process->sigma, factor);
+  out->sigma = scaled(process->sigma, std::sqrt(variance));
   out->kernel = std::make_shared<ScaledKernel>(1 / variance, process->kernel);
   return out;
 }
@@ -123,10 +118,7 @@ Box3 intersection(const Box3& a, const Box3& b) {
 
 std::shared_ptr<const GaussianProcess> inside_out(const GaussianProcess& process) {
   auto out = std::make_shared<GaussianProcess>(process);
-  if (const auto* constant = dynamic_cast<const ConstantField*>(process.mean.get()))
-    out->mean = std::make_shared<ConstantField>(-constant->value({}));
-  else
-    out->mean = std::make_shared<ScaledField>(process.mean, -1.0);
+  out->mean = scaled(process.mean, -1.0);
   if (process.conditions) {
     auto conditions = std::make_shared<Conditions>(process.conditions->points);
     for (Conditions::Point& p : conditions->points) {

@@ -190,10 +190,7 @@ bool TreeMarch::search(TreeSample& a, TreeSample& b, int depth) {
   if (!several) {
     const LeafPoint &p = a.leaf[only], &q = b.leaf[only];
     if (p.f == 0 && p.df < 0) return take(a);
-    // A ray leaves a face that it stands on but for rounding, and a piece of the field ends within
-    // that rounding: f rises, there is no root.
-    const double step = lines_.noises[lines_.leaves[only].noise].step;
-    if (p.f == 0 && p.df > 0 && q.f <= 0 && q.df > 0 && q.t - p.t < 1e-9 * step) return false;
+    if (rises_through_rounding(p, q, lines_.noises[lines_.leaves[only].noise].step)) return false;
     verdict = classify(p, q, lines_.margin(only, p, q));
   }
   if (verdict == Verdict::unclear) {

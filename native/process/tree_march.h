@@ -67,8 +67,6 @@ class TreeMarch {
   // tree_start.cpp
   void start(std::span<const Start> starts);
   void start_noise(Noise& noise, int leaf, const Start& start);
-  PathStart start_of_path(const Leaf& leaf, const Noise& noise, const LeafPoint& fields,
-                          const Start& start);
   void leaving(LeafPoint& p, const Leaf& leaf);
   void engage(int leaf, double a);
   void begin(int noise, double a);

@@ -1,5 +1,6 @@
 // What the leaves of a tree start with: what the path remembers of them (definitions B1-B3), or
 // fresh draws on condition that F > 0 where they are drawn (B2, B4, formulas C7).
+#include "process/path_start.h"
 #include "process/tree_march.h"
 
 namespace gpis {
@@ -75,7 +76,9 @@ void TreeMarch::start_noise(Noise& n, int leaf, const Start& start) {
   TreeSample::NoisePoint& p = from_.noise[l.noise];
   p.known = true;
   if (fields.sigma > 0) {
-    const PathStart known = start_of_path(l, n, fields, start);
+    const PathStart known =
+        path_start(start, 0, fields, l.sign * fields.df, l.sign, l.line->geometry.direction,
+                   *n.path, *l.mean, *l.sigma, *rng_);
     p.g = known.value;
     p.dg = n.path->start(known, *rng_, *counters_);
     n.conditioned = true;
@@ -84,32 +87,6 @@ void TreeMarch::start_noise(Noise& n, int leaf, const Start& start) {
   }
   n.begun = n.current = true;
   n.line->stretches.push_back({0, 0, 0});
-}
-
-// As March::start_of_path, but the ray leaves in the direction in which F grows.
-PathStart TreeMarch::start_of_path(const Leaf& l, const Noise& n, const LeafPoint& fields,
-                                   const Start& start) {
-  PathStart known;
-  known.value = (start.state.value - fields.mean) / fields.sigma;
-  const double without_path = l.sign * fields.df + known.value * fields.dsigma;
-  if (start.kind == Start::Kind::value_slope) {
-    const Vec3& gradient = start.state.gradient;
-    known.slope_known = known.gradient_known = true;
-    known.slope = (dot(l.line->geometry.direction, gradient) - without_path) / fields.sigma;
-    known.gradient =
-        (gradient - l.mean->sample(0).gradient - l.sigma->sample(0).gradient * known.value) /
-        fields.sigma;
-  } else if (start.state.value == 0) {
-    // Flux-weighted (B3).
-    double mean, deviation;
-    n.path->slope_law(known.value, mean, deviation);
-    const double m = l.sign * (without_path + fields.sigma * mean), s = fields.sigma * deviation;
-    known.slope_known = true;
-    known.slope =
-        s > 0 ? (l.sign * s * flux_weighted_normal(m / s, *rng_) - without_path) / fields.sigma
-              : mean;
-  }
-  return known;
 }
 
 // As March::leaving.

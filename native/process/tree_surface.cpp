@@ -27,11 +27,22 @@ Box3 box_of(const ProcessTree& tree, int node, const std::vector<ProcessSurface>
   return box;
 }
 
+bool is_independent_union(const ProcessTree& tree) {
+  if (tree.noises() < static_cast<int>(tree.leaves().size())) return false;
+  for (const ProcessTree::Node& n : tree.nodes())
+    if (n.kind == ProcessTree::Kind::greatest) return false;
+  for (const ProcessTree::Leaf& leaf : tree.leaves())
+    if (leaf.sign < 0) return false;
+  return true;
+}
+
 }  // namespace
 
 TreeSurface::TreeSurface(TreePtr tree, const Affine& object_to_world, Memory memory,
                          Sampler sampler, double missed_root)
-    : tree_(std::move(tree)), inside_out_(ProcessTree::complement(*tree_)) {
+    : tree_(std::move(tree)),
+      inside_out_(ProcessTree::complement(*tree_)),
+      independent_union_(is_independent_union(*tree_)) {
   if (tree_->has_blends())
     throw std::invalid_argument("the tree " + tree_->describe() +
                                 " has a smooth union, which is not marched: fit it "
@@ -64,6 +75,16 @@ TreeHit TreeSurface::first_hit(TreeMarch& march, std::span<Line> lines, const Ra
     const double t = leaves_[0].first_hit(lines[0], ray, t_max, starts[0], rng, counters);
     return {t, t < kInfinity ? 0 : -1};
   }
+  if (independent_union_ && !starts[0].inside) {
+    // Outside of the union is outside of every leaf, and the leaves know nothing of each other.
+    TreeHit first;
+    for (std::size_t k = 0; k < leaves_.size(); ++k) {
+      const double t =
+          leaves_[k].first_hit(lines[k], ray, std::min(first.t, t_max), starts[k], rng, counters);
+      if (t < first.t) first = {t, static_cast<int>(k)};
+    }
+    return first;
+  }
   const Affine& to_object = leaves_[0].world_to_object();
   const LineGeometry geometry{to_object.point(ray.origin), to_object.vector(ray.direction)};
   // Leaves are drawn as they are: a ray inside sees their tree inside out (definitions B7).
@@ -91,8 +112,11 @@ std::vector<std::pair<std::string, std::string>> TreeSurface::plan() const {
   if (leaves_.size() == 1 && tree_->is_single()) return leaves_[0].plan();
   std::vector<std::pair<std::string, std::string>> rows;
   const bool shared = tree_->noises() < static_cast<int>(leaves_.size());
-  rows.emplace_back("composition", tree_->describe() + ", composed per realisation; noise " +
-                                       (shared ? "shared by some leaves" : "independent"));
+  rows.emplace_back("composition",
+                    tree_->describe() + ", composed per realisation; noise " +
+                        (shared ? "shared by some leaves" : "independent") +
+                        (independent_union_ ? "; every leaf marched for itself, the first hit wins"
+                                            : "; leaves marched together"));
   for (std::size_t i = 0; i < leaves_.size(); ++i)
     for (const auto& [key, text] : leaves_[i].plan())
       rows.emplace_back("leaf[" + std::to_string(i) + "]." + key, text);

@@ -1,6 +1,7 @@
 // A tree of processes placed in the world and planned for rendering: its leaves are ProcessSurfaces
 // that share one place, one memory model and one march. A tree of one leaf is that leaf and keeps
-// the march of its own.
+// the march of its own; so do the leaves of a plain union of independent ones, whose first hit is
+// the first of theirs (definitions B5).
 #pragma once
 
 #include "process/surface.h"
@@ -35,6 +36,7 @@ class TreeSurface {
 
  private:
   TreePtr tree_, inside_out_;
+  bool independent_union_;
   std::vector<ProcessSurface> leaves_;
   std::vector<const PlannedLine*> plans_;
   Box3 bounds_;

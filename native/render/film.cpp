@@ -1,6 +1,7 @@
 #include "render/film.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 
@@ -13,8 +14,25 @@ constexpr double kWideStep = 0x1p-64, kSquareStep = 0x1p-56, kNarrowStep = 0x1p-
 // far below.
 constexpr double kFeatureLimit = 0x1p15;
 
-Fixed to_fixed(double v, double step) {
-  return static_cast<Fixed>(v / step);
+// v / 2^-digits, cut towards 0: by the parts of the double, where the compiler's own conversion is
+// a call that takes as long as what a pixel's sample takes in all else.
+template <int digits>
+Fixed to_fixed(double v) {
+  const auto bits = std::bit_cast<std::uint64_t>(v);
+  const int exponent = static_cast<int>(bits >> 52 & 0x7ff);
+  if (exponent == 0) return 0;  // below 2^-1022
+  const std::uint64_t mantissa = (bits & (std::uint64_t{1} << 52) - 1) | std::uint64_t{1} << 52;
+  const int shift = exponent - 1075 + digits;
+  const Fixed magnitude = shift >= 0    ? static_cast<Fixed>(mantissa) << shift
+                          : shift > -64 ? mantissa >> -shift
+                                        : 0;
+  return v < 0 ? -magnitude : magnitude;
+}
+Fixed to_wide(double v) {
+  return to_fixed<64>(v);
+}
+Fixed to_square(double v) {
+  return to_fixed<56>(v);
 }
 std::int64_t to_narrow(double v) {
   return static_cast<std::int64_t>(std::clamp(v, -kFeatureLimit, kFeatureLimit) / kNarrowStep);
@@ -30,8 +48,8 @@ double narrow(std::int64_t v) {
 std::array<Fixed, 4> block_squares(const std::array<Fixed, 3>& radiance, std::uint32_t n) {
   const Color s{wide(radiance[0]), wide(radiance[1]), wide(radiance[2])};
   const double y = luminance(s);
-  return {to_fixed(s.x * s.x / n, kSquareStep), to_fixed(s.y * s.y / n, kSquareStep),
-          to_fixed(s.z * s.z / n, kSquareStep), to_fixed(y * y / n, kSquareStep)};
+  return {to_square(s.x * s.x / n), to_square(s.y * s.y / n), to_square(s.z * s.z / n),
+          to_square(y * y / n)};
 }
 
 // Q of a pixel as a sum over blocks, whatever form it is kept in.
@@ -89,9 +107,10 @@ bool PixelBlock::add(const FilmSample& sample, Counters& counters) {
     radiance[c] = std::clamp(radiance[c], -kRadianceLimit, kRadianceLimit);
   if (length(radiance - sample.radiance) > 0) ++counters.clamped_samples;
   std::array<Fixed, 3> x;
-  for (int c = 0; c < 3; ++c) x[c] = to_fixed(radiance[c], kWideStep);
-  const auto squares = block_squares(x, 1);
-  for (int c = 0; c < 4; ++c) sums_.squares[c] += squares[c];
+  for (int c = 0; c < 3; ++c) x[c] = to_wide(radiance[c]);
+  for (int c = 0; c < 3; ++c) sums_.squares[c] += to_square(radiance[c] * radiance[c]);
+  const double y = luminance(radiance);
+  sums_.squares[3] += to_square(y * y);
   for (int c = 0; c < 3; ++c) {
     sums_.radiance[c] += x[c];
     sums_.normal[c] += to_narrow(sample.normal[c]);
@@ -99,7 +118,7 @@ bool PixelBlock::add(const FilmSample& sample, Counters& counters) {
   }
   sums_.alpha += to_narrow(sample.alpha);
   if (hit) {
-    sums_.depth += to_fixed(std::min(sample.depth, kRadianceLimit), kWideStep);
+    sums_.depth += to_wide(std::min(sample.depth, kRadianceLimit));
     ++sums_.hits;
   }
   ++sums_.count;

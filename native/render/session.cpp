@@ -228,9 +228,12 @@ class Session {
           return false;
         }
         PixelBlock block;
+        const std::uint64_t scramble =
+            block_scramble(options_.seed, static_cast<std::uint64_t>(y) * options_.width + x,
+                           (options_.first_sample + first) / kBlockSamples);
         for (int sample = first; sample < last; ++sample) {
           if (cancelled_) return false;
-          add_sample(tracer, worker, x, y, options_.first_sample + sample, block);
+          add_sample(tracer, worker, x, y, options_.first_sample + sample, scramble, block);
         }
         if (cancelled_) return false;  // the last sample may have been cut short
         std::lock_guard tile_lock(tile_locks_[tile]);
@@ -240,9 +243,9 @@ class Session {
     return true;
   }
 
-  void add_sample(PathTracer& tracer, Worker& worker, int x, int y, int sample, PixelBlock& block) {
+  void add_sample(PathTracer& tracer, Worker& worker, int x, int y, int sample,
+                  std::uint64_t scramble, PixelBlock& block) {
     const std::uint64_t pixel = static_cast<std::uint64_t>(y) * options_.width + x;
-    const std::uint64_t scramble = block_scramble(options_.seed, pixel, sample / kBlockSamples);
     Rng rng(options_.seed, pixel, sample);
     const BlockPoints points(scramble, sample % kBlockSamples);
     const SquarePoint point = points.point(kPixelDecision, rng);
