@@ -129,9 +129,9 @@ void bind_film(py::module_& m) {
           "merge", [](Film& film, const Film& other) { film.add(other); }, py::arg("other"),
           "Adds a film of the same size that holds other blocks.")
       .def_property_readonly("passes", &film_passes, "Passes as of a render's result.")
-      .def_property_readonly(
-          "estimated_error", &Film::estimated_error,
-          "Mean over pixels of the variance of the mean / (mean² + .01), on luminance.");
+      .def_property_readonly("estimated_error", &Film::estimated_error,
+                             "Mean over pixels of variance / (mean² - variance + .01), on "
+                             "luminance; the difference is at least 0.");
 }
 
 }  // namespace gpis

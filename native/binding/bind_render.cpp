@@ -169,7 +169,7 @@ albedo (3); variance (3, of the pixel's mean; inf where there are fewer than two
 
 const char* const kHistoryDoc = R"(A dict(seconds, samples, estimated_error) per round.
 
-samples is the mean per pixel, estimated_error the mean over pixels of (variance of the mean) / (mean² + .01) on luminance
+samples is the mean per pixel, estimated_error the mean over pixels of variance / (E² + .01) on luminance, E² = mean² - variance >= 0
 (relMSE), inf while a pixel has fewer than two samples.)";
 
 const char* const kStatsDoc = R"(dict: every counter, and what the render was.

@@ -79,7 +79,7 @@ struct PathTracer::Impl {
   void remember_others(const Vertex& v);
   void keep_segments(const Vertex& v);
   Vec3 draw(const GradientLaw& law) {
-    if (!law.degenerate) counters->line_normals += 2;
+    if (!law.certain()) counters->line_normals += 2;
     return law.draw(*rng);
   }
   // The sample's point for a decision of the vertex in hand.
@@ -382,7 +382,7 @@ std::optional<ScatterSample> PathTracer::Impl::scatter_at(const Ray& ray, const 
   GradientLaw law = surface.gradient_law(lines[v.surface], v.t, *rng);
   law.mean = law.mean * sign;
   Vec3 gradient = law.mean;
-  if (!law.degenerate) {
+  if (!law.certain()) {
     const auto [xi1, xi2] = square_to_normals(point(kGradientDecision, *rng));
     gradient += law.b1 * xi1 + law.b2 * xi2;
     counters->line_normals += 2;

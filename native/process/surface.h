@@ -45,11 +45,14 @@ struct Start {
 
 // Gradient at a point of a line, given the line sample (t, ∂_d f): ∇f = mean + ξ₁ b1 + ξ₂ b2, ξ iid
 // N(0,1), world space. b1, b2 are orthogonal to the ray direction in the sense b·d = 0, so every
-// draw has the same ∂_d f. `degenerate`: the gradient is (all but) determined, σ = 0 or a
-// remembered gradient over a very short flight; no density is to be used (B10).
+// draw has the same ∂_d f. `degenerate`: no density is to be used (B10), since the gradient is (all
+// but) determined across some direction: σ = 0, a remembered gradient over a very short flight, or
+// a kernel that is constant along an axis. It may still vary along another one.
 struct GradientLaw {
   Vec3 mean, b1, b2;
   bool degenerate = false;
+
+  bool certain() const { return dot(b1, b1) + dot(b2, b2) == 0; }
 
   Vec3 draw(Rng& rng) const {
     const double xi1 = rng.normal(), xi2 = rng.normal();

@@ -1,5 +1,5 @@
-// The film: per pixel, exact sums over blocks of samples, and the passes and error estimate made of
-// them.
+// The film: per pixel, exact sums over blocks of samples (core/block_points.h), and the passes and
+// error estimate made of them.
 //
 // Sums are integers (fixed point), so they do not depend on the order of addition: an image is the
 // same bit by bit whatever the threads, and merged slices equal the whole. The variance of a
@@ -85,8 +85,8 @@ class Film {
       const;  // 3, of the pixel's mean; infinite with fewer than two samples
   std::vector<float> sample_count() const;  // 1
 
-  // Mean over pixels of Var(mean) / (mean² + 0.01) on luminance; infinite while a pixel has fewer
-  // than two samples.
+  // relMSE: mean over pixels of Var(mean) / (E[mean]² + 0.01) on luminance, E[mean]² estimated by
+  // mean² - Var(mean), at least 0; infinite while a pixel has fewer than two samples.
   double estimated_error() const;
   double mean_sample_count() const;
 

@@ -31,9 +31,12 @@ constexpr int kTileSize = 8;
 constexpr auto kProgressInterval = std::chrono::milliseconds(100);
 constexpr auto kPollInterval = std::chrono::milliseconds(25);
 
-std::uint64_t block_scramble(std::uint64_t seed, std::uint64_t pixel, int block) {
-  // Blocks count down from the end of the substreams, samples up from 0.
-  return Rng(seed, pixel, ~static_cast<std::uint64_t>(block))();
+// The random word of a block. Sixteens of samples count down from the end of the substreams,
+// samples up from 0; the second block of a sixteen has its second number.
+std::uint64_t block_scramble(std::uint64_t seed, std::uint64_t pixel, const SampleBlock& block) {
+  Rng words(seed, pixel, ~static_cast<std::uint64_t>(block.first / kBlockSamples));
+  const std::uint64_t word = words();
+  return block.first % kBlockSamples == 0 ? word : words();
 }
 
 class Session {
@@ -214,12 +217,11 @@ class Session {
     }
   }
 
-  // One block of the round for all pixels of a tile. False when time is up or the render is
+  // Sixteen samples of the round for all pixels of a tile. False when time is up or the render is
   // cancelled.
   bool render_tile(PathTracer& tracer, Worker& worker, int tile, int block_in_round) {
     const int first = round_first_ + block_in_round * kBlockSamples;
     const int last = std::min(first + kBlockSamples, round_first_ + round_count_);
-    const bool continues = first % kBlockSamples != 0;
     const int x0 = tile % tiles_x_ * kTileSize, y0 = tile / tiles_x_ * kTileSize;
     for (int y = y0; y < std::min(y0 + kTileSize, options_.height); ++y)
       for (int x = x0; x < std::min(x0 + kTileSize, options_.width); ++x) {
@@ -227,27 +229,31 @@ class Session {
           time_is_up_ = true;
           return false;
         }
-        PixelBlock block;
-        const std::uint64_t scramble =
-            block_scramble(options_.seed, static_cast<std::uint64_t>(y) * options_.width + x,
-                           (options_.first_sample + first) / kBlockSamples);
-        for (int sample = first; sample < last; ++sample) {
-          if (cancelled_) return false;
-          add_sample(tracer, worker, x, y, options_.first_sample + sample, scramble, block);
+        for (int sample = options_.first_sample + first; sample < options_.first_sample + last;) {
+          const SampleBlock place = block_of(sample);
+          const bool continues = sample != place.first;
+          const std::uint64_t scramble = block_scramble(
+              options_.seed, static_cast<std::uint64_t>(y) * options_.width + x, place);
+          PixelBlock block;
+          const int end = std::min(place.first + place.size, options_.first_sample + last);
+          paths_done_ += end - sample;
+          for (; sample < end; ++sample) {
+            if (cancelled_) return false;
+            add_sample(tracer, worker, x, y, sample, place, scramble, block);
+          }
+          if (cancelled_) return false;  // the last sample may have been cut short
+          std::lock_guard tile_lock(tile_locks_[tile]);
+          result_.film.add(static_cast<std::size_t>(y) * options_.width + x, block, continues);
         }
-        if (cancelled_) return false;  // the last sample may have been cut short
-        std::lock_guard tile_lock(tile_locks_[tile]);
-        result_.film.add(static_cast<std::size_t>(y) * options_.width + x, block, continues);
-        paths_done_ += last - first;
       }
     return true;
   }
 
   void add_sample(PathTracer& tracer, Worker& worker, int x, int y, int sample,
-                  std::uint64_t scramble, PixelBlock& block) {
+                  const SampleBlock& block, std::uint64_t scramble, PixelBlock& to) {
     const std::uint64_t pixel = static_cast<std::uint64_t>(y) * options_.width + x;
     Rng rng(options_.seed, pixel, sample);
-    const BlockPoints points(scramble, sample % kBlockSamples);
+    const BlockPoints points(scramble, sample - block.first, block.size);
     const SquarePoint point = points.point(kPixelDecision, rng);
     const CameraRay ray =
         camera_.ray(x + 0.5 + filter_.offset(point.u), y + 0.5 + filter_.offset(point.v));
@@ -260,7 +266,7 @@ class Session {
       film_sample.radiance *= clamp_ / brightest;
       ++worker.counters.clamped_samples;
     }
-    if (!block.add(film_sample, worker.counters)) {
+    if (!to.add(film_sample, worker.counters)) {
       const BadSample bad{sample, x, y};
       if (!worker.bad_sample || earlier(bad, *worker.bad_sample)) worker.bad_sample = bad;
     }

@@ -1,11 +1,13 @@
-"""The benchmarks: python tests/bench/run.py [NAME...] runs those whose name contains a NAME, or all.
+"""The benchmarks: python tests/bench/run.py [NAME...] [--quick] [--again] runs those whose name contains a NAME, or all.
 
-A benchmark is a function bench_*() in a file bench_*.py here. It measures and returns one row (a dict of column to
+A benchmark is a function bench_*() in a file bench_*.py here; one that has parameters `quick` and `again` gets these options:
+less of everything, and nothing taken from an earlier run. It measures and returns one row (a dict of column to
 number or text) or a list of rows. The table goes to the screen, everything to out/bench/results.json. Times are for
 people to compare on one machine; no test depends on them.
 """
 
 import importlib.util
+import inspect
 import json
 import os
 import platform
@@ -41,14 +43,19 @@ def print_table(rows):
         print("  " + "  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True)))
 
 
-def main(wanted):
+def main(arguments):
+    options = {a.removeprefix("--"): True for a in arguments if a.startswith("--")}
+    if unknown := set(options) - {"quick", "again"}:
+        sys.exit(f"there is no option --{min(unknown)}; there are --quick and --again")
+    wanted = [a for a in arguments if not a.startswith("--")]
     results = {"machine": {"processor": platform.processor() or platform.machine(), "threads": os.cpu_count()}}
     results |= {"build": gn.build_info(), "benchmarks": {}}
     for name, function in discover():
         if wanted and not any(part in name for part in wanted):
             continue
         start = time.perf_counter()
-        rows = function()
+        taken = inspect.signature(function).parameters
+        rows = function(**{name: on for name, on in options.items() if name in taken})
         rows = [rows] if isinstance(rows, dict) else rows
         print(f"{name} ({time.perf_counter() - start:.1f} s)")
         print_table(rows)

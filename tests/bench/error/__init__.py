@@ -1,0 +1,1 @@
+"""Error against run time: scenes x methods, rendered to growing budgets against converged references."""

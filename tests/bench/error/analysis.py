@@ -1,0 +1,91 @@
+"""Numbers of a cell against its reference. Errors are relMSE as the film defines it: mean over pixels of squared
+difference / (mean² + .01), on luminance."""
+
+import numpy as np
+
+
+def weights(reference):
+    return 1 / (reference**2 + 0.01)
+
+
+def errors(images, reference, reference_variance):
+    """relMSE (repeats, budgets), the reference's own noise taken off."""
+    w = weights(reference)
+    return np.mean(w * (images - reference) ** 2, axis=(2, 3)) - np.mean(w * reference_variance)
+
+
+def variance(images, reference):
+    """The part of relMSE that is variance, by the spread of the repeats: (budgets,)."""
+    return np.mean(weights(reference) * images.var(axis=0, ddof=1), axis=(1, 2))
+
+
+def bias(images, reference, reference_variance):
+    """Squared bias in relMSE and its standard error (unbiased: may be negative), and the bias of the mean over the
+    picture, relative to it, with its standard error; from the largest budget."""
+    last = images[:, -1]
+    difference = last.mean(axis=0) - reference
+    noise = last.var(axis=0, ddof=1) / len(last) + reference_variance
+    w, pixels = weights(reference), reference.size
+    squared = difference**2 - noise
+    # The noise is itself estimated, from len(last) - 1 degrees of freedom.
+    spread = 2 * noise**2 * (1 + 1 / (len(last) - 1)) + 4 * noise * np.maximum(squared, 0)
+    mean = reference.mean()
+    return {
+        "squared": float(np.mean(w * squared)),
+        "squared_error": float(np.sqrt(np.sum(w**2 * spread)) / pixels),
+        "mean": float(difference.mean() / mean),
+        "mean_error": float(np.sqrt(noise.sum()) / pixels / mean),
+    }
+
+
+def slope(seconds, relmse):
+    """Slope of log √relMSE over log seconds, and its standard error by leaving out one repeat at a time."""
+
+    def fit(rows):
+        e = relmse[rows].mean(axis=0)
+        if np.any(e <= 0):
+            return np.nan
+        return np.polyfit(np.log(seconds[rows].mean(axis=0)), 0.5 * np.log(e), 1)[0]
+
+    n = len(relmse)
+    if relmse.shape[1] < 2:
+        return None, None
+    parts = [fit(np.arange(n) != k) for k in range(n)]
+    return float(fit(np.arange(n))), float(np.sqrt((n - 1) / n * np.sum((parts - np.mean(parts)) ** 2)))
+
+
+def evaluate(cell, images, reference, reference_variance):
+    """All numbers of one cell that the report shows."""
+    seconds = np.array(cell["seconds"])
+    relmse = errors(images, reference, reference_variance)
+    found = {
+        "seconds": seconds.mean(axis=0).tolist(),
+        "relmse": relmse.mean(axis=0).tolist(),
+        "relmse_error": (relmse.std(axis=0, ddof=1) / np.sqrt(len(relmse))).tolist(),
+        "variance": variance(images, reference).tolist(),
+        "bias": bias(images, reference, reference_variance),
+    }
+    found["slope"], found["slope_error"] = slope(seconds, relmse)
+    # Variance times seconds: with the bias, the whole curve.
+    found["cost"] = float(np.exp(np.mean(np.log(np.maximum(found["variance"], 1e-300)) + np.log(found["seconds"]))))
+    b = found["bias"]
+    found["floor"] = max(b["squared"], 0.0) if b["squared"] > 3 * b["squared_error"] else 0.0
+    return found
+
+
+def ratio_at_equal_time(method, default, seconds):
+    """relMSE of the method over that of the default after the same seconds of the processor."""
+    return (method["floor"] + method["cost"] / seconds) / (default["floor"] + default["cost"] / seconds)
+
+
+def ratio_at_equal_error(method, default, relmse):
+    """Seconds to reach an error, over those of the default; infinite below the floor of the method's bias."""
+    if relmse <= method["floor"]:
+        return np.inf
+    return (method["cost"] / (relmse - method["floor"])) / (default["cost"] / (relmse - default["floor"]))
+
+
+def calibration(cell, images, reference, reference_variance):
+    """Mean over the repeats of estimated over true error, with its standard error, per budget."""
+    ratio = np.array(cell["estimated_error"]) / errors(images, reference, reference_variance)
+    return ratio.mean(axis=0), ratio.std(axis=0, ddof=1) / np.sqrt(len(ratio))

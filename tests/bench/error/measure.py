@@ -1,0 +1,149 @@
+"""One cell of the bench: a scene by a method, rendered several times to growing budgets, in a process of its own (so that
+its memory is its own, and a crash is a line of the report). A cell is a .json file, its pictures an .npz beside it."""
+
+import json
+import multiprocessing
+import resource
+import time
+from dataclasses import dataclass
+
+import gpis_native as gn
+import numpy as np
+
+from .methods import default, methods_of, reference_of
+from .scenes import SCENES
+
+LUMINANCE = np.array((0.2126, 0.7152, 0.0722))
+BLOCK = 16  # samples: slices of a render are multiples of it
+REFERENCE_FACTOR = 100  # samples of a reference, over those of the largest budget it judges
+PILOT_SEED, REFERENCE_SEED = 10**6, 2 * 10**6
+COUNTERS = (
+    "path_vertices", "shadow_rays", "mesh_rays", "line_segments", "line_evaluations", "line_normals", "line_splits",
+    "factorisations", "mean_lookups", "sigma_lookups",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Effort:
+    name: str
+    size: int  # pixels a side
+    slow_size: int  # of scenes that take more than a hundredth of a millisecond a path
+    seconds: float  # of the processor, for a cell
+    reference_seconds: float  # of the processor, for a reference, at most
+    largest: int  # samples per pixel
+    repeats: int
+    default_repeats: int  # of the default method: those of the calibration
+
+
+FULL = Effort("full", 24, 12, 5.0, 200.0, 128, 6, 30)
+QUICK = Effort("quick", 16, 6, 0.4, 6.0, 32, 3, 12)
+SLOW = ("painted", "everything")
+
+
+def size_of(scene, effort):
+    return effort.slow_size if scene.name in SLOW else effort.size
+
+
+def scene_named(name):
+    return next(s for s in SCENES if s.name == name)
+
+
+def method_named(scene, key):
+    if key.startswith("by_") or key == "truth":
+        return next(r for r in (reference_of(scene, m) for m in methods_of(scene)) if r.key == key)
+    return next(m for m in methods_of(scene) if m.key == key)
+
+
+def rate(description, size, seconds):
+    """Paths per second of the processor, from a short render."""
+    gn.render(description, size, size, samples=1, seed=PILOT_SEED, threads=1)  # tables are made once
+    paths, spent, sample = 0, 0.0, 0
+    while spent < seconds and sample < 16 * BLOCK:
+        start = time.process_time()
+        gn.render(description, size, size, samples=BLOCK, first_sample=sample, seed=PILOT_SEED, threads=1)
+        spent += time.process_time() - start
+        paths += BLOCK * size * size
+        sample += BLOCK
+    return paths / spent
+
+
+def budgets(scene, method, effort, folder, planned):
+    """Samples per pixel: powers of two times 16 that the cell's seconds and its reference's seconds allow."""
+    size = size_of(scene, effort)
+    reference = gn.Scene(reference_of(scene, method).describe(scene, folder))
+    repeats = effort.default_repeats if method.key == "default" else effort.repeats
+    speed = rate(planned, size, 0.05 * effort.seconds)
+    reference_speed = rate(reference, size, 0.05 * effort.seconds)
+    pixels = size * size
+    allowed = min(effort.seconds * speed / (repeats * pixels), effort.reference_seconds * reference_speed / (100 * pixels))
+    steps = [BLOCK]
+    while 2 * steps[-1] <= min(allowed, effort.largest):
+        steps.append(2 * steps[-1])
+    return steps, repeats
+
+
+def measure(scene, method, effort, folder):
+    """The cell as a dict for .json, and luminance (repeats, budgets, H, W)."""
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    start = time.process_time()
+    try:
+        planned = gn.Scene(method.describe(scene, folder))
+    except ValueError as error:
+        return {"refused": str(error)}, None
+    setup = time.process_time() - start
+    size = size_of(scene, effort)
+    steps, repeats = budgets(scene, method, effort, folder, planned)
+    images = np.zeros((repeats, len(steps), size, size))
+    seconds, estimates, counters = np.zeros(images.shape[:2]), np.zeros(images.shape[:2]), dict.fromkeys(COUNTERS, 0)
+    for k in range(repeats):
+        so_far, spent = None, 0.0
+        for b, samples in enumerate(steps):
+            first = steps[b - 1] if b else 0
+            start = time.process_time()
+            slice_ = gn.render(planned, size, size, samples=samples - first, first_sample=first, seed=k, threads=1)
+            spent += time.process_time() - start
+            so_far = gn.merge([so_far, slice_]) if b else slice_
+            images[k, b] = so_far.passes["combined"][..., :3].astype(float) @ LUMINANCE
+            seconds[k, b], estimates[k, b] = spent, so_far.stats["estimated_error"]
+        for name in COUNTERS:
+            counters[name] += so_far.stats[name]
+    paths = repeats * steps[-1] * size * size
+    cell = {
+        "samples": steps,
+        "size": size,
+        "repeats": repeats,
+        "seconds": seconds.tolist(),
+        "estimated_error": estimates.tolist(),
+        "setup_seconds": setup,
+        "paths_per_second": paths / float(seconds[:, -1].sum()),
+        "per_path": {name: count / paths for name, count in counters.items()},
+        "memory_mb": (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024,
+    }
+    return cell, images
+
+
+def _work(scene_name, key, effort, folder):
+    scene = scene_named(scene_name)
+    path = folder / f"{scene_name}.{key}"
+    cell, images = measure(scene, method_named(scene, key), effort, folder.parent / "files")
+    if images is not None:
+        np.save(path.with_name(path.name + ".npy"), images.astype(np.float32))
+    path.with_name(path.name + ".json").write_text(json.dumps(cell, indent=1) + "\n")
+
+
+def cell_of(scene, method, effort, folder):
+    """The cell from its file, or measured now."""
+    path = folder / f"{scene.name}.{method.key}.json"
+    if not path.exists():
+        child = multiprocessing.get_context("spawn").Process(target=_work, args=(scene.name, method.key, effort, folder))
+        child.start()
+        child.join()
+        if child.exitcode:
+            return {"refused": f"ended with exit code {child.exitcode}"}, None
+    cell = json.loads(path.read_text())
+    pictures = path.with_suffix(".npy")
+    return cell, np.load(pictures).astype(float) if pictures.exists() else None
+
+
+def is_default(scene, method):
+    return method == default(scene)

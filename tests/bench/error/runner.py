@@ -1,0 +1,175 @@
+"""A run: all cells, then the references they need, then the numbers. What is there from an earlier call of the same module is
+not done again; a changed module starts a new run, and the numbers of the last one stay for comparison."""
+
+import hashlib
+import json
+import os
+import platform
+import sys
+import time
+from pathlib import Path
+
+import gpis_native as gn
+import numpy as np
+
+from . import rates
+from .analysis import calibration, evaluate
+from .measure import FULL, QUICK, cell_of, is_default, size_of
+from .methods import methods_of, reference_of
+from .references import reference_image
+from .scenes import available
+
+OUT = Path(__file__).parents[3] / "out" / "bench" / "error"
+REFERENCE_WEIGHT = 3  # of the bar, over a cell's
+
+
+class Bar:
+    """One line on the terminal: how far, how long, what."""
+
+    def __init__(self, total):
+        self.total, self.done, self.start, self.shown = total, 0.0, time.monotonic(), ""
+
+    def show(self, what, part=0.0):
+        fraction = min((self.done + part) / self.total, 1.0)
+        passed = time.monotonic() - self.start
+        self.shown = f"[{'#' * int(30 * fraction):<30}] {100 * fraction:3.0f} %  {passed:5.0f} s  {what}"
+        if sys.stderr.isatty():
+            print(f"\r{self.shown:<110}"[:110], end="", file=sys.stderr, flush=True)
+
+    def step(self, weight, what):
+        self.done += weight
+        self.show(what)
+        if not sys.stderr.isatty():
+            print(self.shown, file=sys.stderr, flush=True)
+
+    def end(self):
+        if sys.stderr.isatty():
+            print(file=sys.stderr)
+
+
+def module_hash():
+    return hashlib.sha256(Path(gn.__file__).read_bytes()).hexdigest()[:16]
+
+
+def processor():
+    try:
+        names = [line.split(":", 1)[1].strip() for line in Path("/proc/cpuinfo").read_text().splitlines() if "model name" in line]
+    except OSError:
+        names = []
+    return names[0] if names else platform.machine()
+
+
+def begin(folder, again):
+    """The run's own folder of cells, made anew where the module has changed."""
+    folder.mkdir(parents=True, exist_ok=True)
+    state, module = folder / "run.json", module_hash()
+    known = json.loads(state.read_text()) if state.exists() else None
+    if known is None or known["module"] != module or again:
+        if (folder / "summary.json").exists():
+            (folder / "summary.json").replace(folder / "previous.json")
+        for old in (folder / "cells").glob("*"):
+            old.unlink()
+        known = {"module": module, "begun": time.strftime("%Y-%m-%d %H:%M"), "yardstick": rates.yardstick()}
+        known |= {"processor": processor(), "threads": os.cpu_count()}
+        state.write_text(json.dumps(known, indent=1) + "\n")
+    (folder / "cells").mkdir(exist_ok=True)
+    return known
+
+
+def cached(path, make):
+    if not path.exists():
+        path.write_text(json.dumps(make(), indent=1) + "\n")
+    return json.loads(path.read_text())
+
+
+def methods_for(scene, effort):
+    """A quick run leaves out what is measured against whole realisations: those references are slow."""
+    return [m for m in methods_of(scene) if effort is not QUICK or m.group == "sampler"]
+
+
+def preview(folder, scene, effort, files):
+    path = folder / "cells" / f"{scene.name}.preview.npy"
+    if not path.exists():
+        size, samples = (96, 32) if effort is FULL else (32, 16)
+        description = gn.Scene(scene.make("auto", "renewal+", files))
+        result = gn.render(description, size, size, samples=samples, time_limit=20)
+        np.save(path, result.passes["combined"][..., :3])
+    return np.load(path)
+
+
+def run(quick=False, again=False):
+    """All of it, as one dict that the report shows."""
+    effort = QUICK if quick else FULL
+    folder = OUT / effort.name
+    files = folder / "files"
+    known = begin(folder, again)
+    scenes, missing = available()
+    plan = [(scene, method) for scene in scenes for method in methods_for(scene, effort)]
+    needed = {(s.name, reference_of(s, m).key) for s, m in plan}
+    bar = Bar(len(plan) + REFERENCE_WEIGHT * len(needed) + len(scenes))
+    cells = {}
+    for scene, method in plan:
+        bar.show(f"{scene.name}, {method.title}")
+        cells[scene.name, method.key] = cell_of(scene, method, effort, folder / "cells")
+        bar.step(1, f"{scene.name}, {method.title}")
+    largest = {}
+    for scene, method in plan:
+        cell = cells[scene.name, method.key][0]
+        key = scene.name, reference_of(scene, method).key
+        largest[key] = max(largest.get(key, 0), *cell.get("samples", [0]))
+    references = {}
+    for scene, method in plan:
+        reference = reference_of(scene, method)
+        key = scene.name, reference.key
+        if key in references or not largest[key]:
+            continue
+        what = f"reference of {scene.name}, {reference.title}"
+        references[key] = reference_image(
+            folder / "references", scene, reference, size_of(scene, effort), largest[key], files,
+            lambda fraction, _, what=what: bar.show(what, REFERENCE_WEIGHT * fraction),
+        )  # fmt: skip
+        bar.step(REFERENCE_WEIGHT, what)
+    found = []
+    for scene in scenes:
+        found.append(numbers(scene, effort, cells, references) | {"picture": preview(folder, scene, effort, files)})
+        bar.step(1, f"numbers of {scene.name}")
+    bar.end()
+    known |= {"effort": effort.name, "missing": missing, "scenes": found}
+    known["rates"] = cached(folder / "cells" / "rates.json", lambda: rates.measure_rates(2 if quick else 5, missing))
+    known["profile"] = cached(folder / "cells" / "profile.json", lambda: rates.sphere_profile(16 if quick else 256))
+    previous = folder / "previous.json"
+    known["previous"] = json.loads(previous.read_text()) if previous.exists() else None
+    (folder / "summary.json").write_text(json.dumps(summary(known), indent=1) + "\n")
+    return known
+
+
+def numbers(scene, effort, cells, references):
+    rows, calibrated = [], None
+    for method in methods_for(scene, effort):
+        cell, images = cells[scene.name, method.key]
+        row = {"key": method.key, "title": method.title, "group": method.group, "cell": cell}
+        if images is not None:
+            reference = reference_of(scene, method)
+            image, noise, samples = references[scene.name, reference.key]
+            row["reference"] = {"title": reference.title, "samples": samples}
+            row["found"] = evaluate(cell, images, image, noise)
+            if is_default(scene, method):
+                ratio, error = calibration(cell, images, image, noise)
+                calibrated = {"samples": cell["samples"], "ratio": ratio.tolist(), "error": error.tolist()}
+        rows.append(row)
+    return {"scene": scene, "rows": rows, "calibration": calibrated}
+
+
+def summary(known):
+    """What the next run is compared with."""
+    return {
+        "module": known["module"],
+        "begun": known["begun"],
+        "yardstick": known["yardstick"],
+        "cells": {
+            f"{found['scene'].name}.{row['key']}": {"rate": row["cell"]["paths_per_second"], "cost": row["found"]["cost"]}
+            for found in known["scenes"]
+            for row in found["rows"]
+            if "found" in row
+        },
+    }
