@@ -129,17 +129,28 @@ class GridField::Line final : public FieldLine {
     return brick.values < 0 ? brick_exit(step) : step.exit;
   }
 
-  // A line of a grid with the same nodes has been located where this one is to be.
-  void follow(const Line& other) { step_ = other.step_; }
+  // From here on both lines, of grids with the same nodes, are located by the other one, which
+  // stays where it is in memory.
+  void follow(const Line& other) { leader_ = &other; }
   bool can_follow(const Line& other) const { return field_->same_lattice(*other.field_); }
 
   // The trilinear cell as a cubic in s = t - middle.
   void enter(double a, double b) override {
     middle_ = std::isfinite(b) ? (a + b) / 2 : a + std::max(unit_, std::abs(a));
     // The cell that was located last, in nearly all cases.
-    place_ = a == step_.at && b <= step_.exit && a >= box_in_ && b <= box_out_
-                 ? inside(step_.cell, at(middle_))
-                 : field_->place(at(middle_));
+    const Vec3 x = at(middle_);
+    const Step& step = located();
+    if (a == step.at && b <= step.exit && a >= box_in_ && b <= box_out_) {
+      // Number by number: whole structs would wait for the stores of their parts.
+      for (int i = 0; i < 3; ++i) {
+        const int cell = step.cell[i];
+        place_.cell[i] = cell;
+        place_.local[i] = x[i] - cell;
+        place_.outside[i] = false;
+      }
+    } else {
+      place_ = field_->place(x);
+    }
     constant_ = true;
     if (field_->background_ && place_.any_outside()) return set_constant(*field_->background_);
     const BrickGrid::Brick& brick = field_->grid_->brick_of(place_.cell);
@@ -201,9 +212,7 @@ class GridField::Line final : public FieldLine {
     double exit = -kInfinity;
     double at = -kInfinity;  // the t that it was located for
   };
-  static Place inside(const Index3& cell, const Vec3& x) {
-    return {cell, {x.x - cell[0], x.y - cell[1], x.z - cell[2]}, {false, false, false}};
-  }
+  Step& located() const { return leader_ ? leader_->step_ : step_; }
   Vec3 at(double t) const { return anchor_ + direction_ * (t - anchor_t_); }
   double face_time(int axis, int face) const {
     return anchor_t_ + (face - anchor_[axis]) * inverse_[axis];
@@ -212,8 +221,9 @@ class GridField::Line final : public FieldLine {
     return field_->background_ && (t < box_in_ - sliver_ || t >= box_out_ - sliver_);
   }
   const Step& locate(double t) const {
-    if (t == step_.at) return step_;
-    if (t != step_.exit) {  // not on from the last step
+    Step& step = located();
+    if (t == step.at) return step;
+    if (t != step.exit) {  // not on from the last step
       const Vec3 x = at(t);
       for (int i = 0; i < 3; ++i) {
         const int nodes = field_->grid_->nodes()[i];
@@ -222,23 +232,24 @@ class GridField::Line final : public FieldLine {
         int face = -1;
         if (inverse_[i] > 0) face = std::max(static_cast<int>(clamped + 1) - 1, 0);
         if (inverse_[i] < 0) face = std::min(nodes - static_cast<int>(nodes - clamped), nodes - 1);
-        step_.cell[i] = cell_of(x[i], nodes);
-        set_face(i, face);
+        step.cell[i] = cell_of(x[i], nodes);
+        set_face(step, i, face);
       }
     }
     for (int i = 0; i < 3; ++i)
-      while (step_.time[i] <= t + sliver_) set_face(i, step_.face[i] + (inverse_[i] > 0 ? 1 : -1));
-    step_.exit = std::min({step_.time[0], step_.time[1], step_.time[2]});
-    step_.at = t;
-    return step_;
+      while (step.time[i] <= t + sliver_)
+        set_face(step, i, step.face[i] + (inverse_[i] > 0 ? 1 : -1));
+    step.exit = std::min({step.time[0], step.time[1], step.time[2]});
+    step.at = t;
+    return step;
   }
-  void set_face(int axis, int face) const {
+  void set_face(Step& step, int axis, int face) const {
     const int nodes = field_->grid_->nodes()[axis];
-    step_.face[axis] = face;
-    step_.time[axis] =
+    step.face[axis] = face;
+    step.time[axis] =
         inverse_[axis] != 0 && face >= 0 && face < nodes ? face_time(axis, face) : kInfinity;
     if (inverse_[axis] != 0)
-      step_.cell[axis] = std::clamp(inverse_[axis] > 0 ? face - 1 : face, 0, nodes - 2);
+      step.cell[axis] = std::clamp(inverse_[axis] > 0 ? face - 1 : face, 0, nodes - 2);
   }
   // When the ray leaves the brick of its cell.
   double brick_exit(const Step& step) const {
@@ -266,6 +277,7 @@ class GridField::Line final : public FieldLine {
   double anchor_t_ = 0, unit_, sliver_, box_in_, box_out_;
 
   mutable Step step_;  // the last one located: where the next one starts from
+  const Line* leader_ = nullptr;
   // The piece selected last, in s = t - middle.
   double cubic_[4], middle_ = 0;
   Place place_;

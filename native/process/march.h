@@ -37,7 +37,8 @@ class March {
     mean_deviation_ = 0.05 * speed * curvature * curvature * curvature;
     mean_slope_ = plan.mean_lipschitz * speed;
     sigma_slope_ = plan.sigma_lipschitz * speed;
-    if constexpr (kSameFields) follows_ = sigma_.can_follow(mean_);
+    if constexpr (kSameFields)
+      if (sigma_.can_follow(mean_)) sigma_.follow(mean_);
   }
 
   // Fills line.hit_* and returns the hit's t, or infinity.
@@ -138,8 +139,6 @@ class March {
   double step_end(double a, double t_end) {
     piece_end_ = kInfinity;
     if constexpr (MeanLine::kBreaks) piece_end_ = mean_.next_break(a);
-    if constexpr (kSameFields)
-      if (follows_) sigma_.follow(mean_);
     if constexpr (SigmaLine::kBreaks) piece_end_ = std::min(piece_end_, sigma_.next_break(a));
     const double b = std::min({cell_end(), a + smooth_step_, t_end, piece_end_});
     // Nothing ends the step: a constant path over a mean without curvature. Steps that double end
@@ -382,7 +381,6 @@ class March {
   double piece_end_ = kInfinity;                     // where the smooth piece of the fields ends
   double smooth_step_, mean_deviation_;
   double far_g_ = 0, far_dg_ = 0;     // at the end of the cell that was tried
-  bool follows_ = false;              // the deviation's grid has the nodes of the mean's
   double step_ = 1, resolution_ = 0;  // of the path's cells, of a root
 };
 
