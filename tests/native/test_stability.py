@@ -3,7 +3,6 @@
 import gpis_native as gn
 import numpy as np
 import pytest
-
 from stability import anisotropy, conditions, fields, levels, memories, rays, scales, starts, transforms
 from stability.verdicts import REFUSED, RIGHT, Outcome, judge, of_cdf, of_sample, within
 
