@@ -8,6 +8,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 from matplotlib.colors import LinearSegmentedColormap, Normalize  # noqa: E402
+from PIL import Image  # noqa: E402
 
 from stability.verdicts import ENDED, REFUSED, RIGHT, WRONG  # noqa: E402
 
@@ -73,6 +74,8 @@ def picture(family, cells, path):
     figure.suptitle(f"{family}\n{said}; largest error {worst:.2f} of what is allowed", fontsize=10)
     figure.savefig(path, dpi=90)
     plt.close(figure)
+    with Image.open(path) as drawn:  # a third of the size, for the repository
+        drawn.convert("RGB").quantize(48).save(path, optimize=True)
 
 
 def square(axis, x, y, cell):
