@@ -5,6 +5,7 @@ A skipped test proves nothing, so each reason must be on the list expected_skips
 
 import os
 import re
+import resource
 from collections import Counter
 from pathlib import Path
 
@@ -68,7 +69,22 @@ def _unexpected(config):
     return [r for r in config.stash[_reasons] if not any(e.search(r) for e in EXPECTED)]
 
 
+# What the whole suite takes, several times over. A test that runs away meets it and fails by name, MemoryError, where the
+# system would end pytest without a word. Every core's threads have arenas of their own, which are only reserved.
+ADDRESS_SPACE = (12 + (os.cpu_count() or 1)) << 30
+
+
+def _limit_memory():
+    """Not under sanitizers, whose shadow of the address space is larger than any limit."""
+    if os.environ.get("GPIS_SANITIZE"):
+        return
+    _, most = resource.getrlimit(resource.RLIMIT_AS)
+    if most == resource.RLIM_INFINITY or most > ADDRESS_SPACE:
+        resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_SPACE, most))
+
+
 def pytest_configure(config):
+    _limit_memory()
     config.stash[_reasons] = Counter()
     config.stash[_figures] = []
     config.pluginmanager.register(SkipAccount(config))

@@ -33,3 +33,8 @@ def check_same_distribution(a, b, what=""):
     n = math.sqrt(len(a) * len(b) / (len(a) + len(b)))
     p = min(1.0, 2 * math.exp(-2 * (n * distance) ** 2))
     assert p > SIGNIFICANCE, f"{what}: KS distance {distance:.5f}, p = {p:.1e}"
+
+
+def normal_cdf(z):
+    """Φ, to rounding in both tails."""
+    return 0.5 * np.vectorize(math.erfc, otypes=[float])(-np.asarray(z, dtype=float) / math.sqrt(2))

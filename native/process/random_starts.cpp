@@ -35,8 +35,9 @@ double truncated_normal(double low, double high, Rng& rng) {
 
 double log_normal_tail(double a) {
   if (a < 30) return std::log(0.5 * std::erfc(a / std::sqrt(2)));
-  const double r = 1 / (a * a);  // asymptotic series, 1e-7 at 30
-  return -0.5 * a * a - std::log(a * std::sqrt(2 * kPi)) + std::log1p(-r * (1 - 3 * r));
+  const double r = 1 / (a * a);  // asymptotic series, 2e-12 at 30
+  return -0.5 * a * a - std::log(a * std::sqrt(2 * kPi)) +
+         std::log1p(-r * (1 - 3 * r * (1 - 5 * r * (1 - 7 * r))));
 }
 
 double flux_weighted_normal(double a, Rng& rng) {

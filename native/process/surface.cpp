@@ -1,5 +1,6 @@
 #include "process/surface.h"
 
+#include <cmath>
 #include <sstream>
 #include <stdexcept>
 
@@ -33,6 +34,27 @@ Sampler sampler_for(Memory memory, Sampler sampler) {
   return Sampler::realisation;
 }
 
+// The march ends a line after 2^20 steps (process/march.h), some four of them a length scale. Where
+// mean and deviation are constant, Rice's rate (oracle 2) says how many rays get so far: more of
+// them than roots may be missed would end in the middle of the process without a word.
+void check_steps(const PlannedLine& plan, double missed_root) {
+  const Range mean = plan.process->mean->range(), sigma = plan.process->sigma->range();
+  constexpr double kSteps = 1 << 20;
+  if (!(plan.steps > kSteps) || mean.min != mean.max || sigma.min != sigma.max || sigma.min == 0 ||
+      mean.min > plan.skip_threshold)
+    return;
+  const double level = mean.min / sigma.min, lengths = kSteps / 4;
+  const double rate = std::exp(-0.5 * level * std::max(level, 0.0)) / (2 * kPi);  // a length scale
+  if (std::exp(-rate * lengths) <= missed_root) return;
+  throw std::invalid_argument(
+      "The mean of " + std::to_string(level) +
+      " standard deviations is rarely met and nowhere certain, and the bounds are " +
+      std::to_string(static_cast<long>(plan.steps / 4)) +
+      " length scales across: a ray may take more than the " +
+      std::to_string(static_cast<long>(kSteps)) +
+      " steps that are the most. Take a longer length_scale, smaller bounds, or a smaller mean.");
+}
+
 }  // namespace
 
 ProcessSurface::ProcessSurface(std::shared_ptr<const GaussianProcess> process,
@@ -44,6 +66,7 @@ ProcessSurface::ProcessSurface(std::shared_ptr<const GaussianProcess> process,
       missed_root_(missed_root),
       planned_(std::make_shared<PlannedLine>(
           plan_line(std::move(process), memory, sampler_, missed_root))) {
+  check_steps(*planned_, missed_root);
   const double volume = determinant(object_to_world.linear);
   if (!std::isfinite(volume) || std::abs(volume) < 1e-300)
     throw std::invalid_argument(

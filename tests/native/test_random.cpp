@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "check.h"
+#include "process/surface.h"
 
 using namespace gpis;
 using namespace gpis::test;
@@ -99,4 +100,40 @@ TEST(a_stream_is_that_of_its_seeds) {
   CHECK(Rng(1, 2, 3)(), !=, Rng(1, 2, 4)());
   CHECK(Rng(1, 2, 3)(), !=, Rng(1, 3, 3)());
   CHECK(Rng(1, 2, 3)(), !=, Rng(2, 2, 3)());
+}
+
+// Numbers in 60 digits, by tests/stability/tables.py: log Φ(-a).
+TEST(log_of_the_normal_tail_is_that_of_many_digits) {
+  constexpr double kTable[][2] = {
+      {0, -0.6931471805599453094},     {8, -35.013437159914549895},  {29.5, -439.42947460915022775},
+      {30, -454.32124395634319710},    {35, -616.97510126192251347}, {40, -804.60844201375378816},
+      {10000, -50000010.129278915180},
+  };
+  for (const auto& [a, expected] : kTable)
+    // 1e-10 of the probability itself, but for the rounding of a²/2.
+    CHECK(std::abs(log_normal_tail(a) - expected), <, 1e-10 + 3e-16 * std::abs(expected));
+}
+
+// E[Z - a | Z > a], and the mean of the density ∝ z₊ N(z; -a, 1), from the same script.
+TEST(far_tails_have_the_moments_of_many_digits) {
+  constexpr double kTable[][3] = {
+      {-8, 8.00000000000000505, 8.12499999999999992},
+      {-1, 1.28759997093917836, 1.77663872520173926},
+      {0, 0.79788456080286536, 1.25331413731550025},
+      {1, 0.52513527616098121, 0.90427123332969182},
+      {8, 0.12136811223611268, 0.23939650684006689},
+      {40, 0.02496884720726372, 0.04990665764851819},
+      {1000, 0.00099999800000999, 0.00199999400004200},
+  };
+  Rng rng(17, 0);
+  for (const auto& [a, beyond, flux] : kTable) {
+    // In units of what is expected: Mean allows for rounding of 1e-9 of 1.
+    Mean truncated, weighted;
+    for (int i = 0; i < kDraws / 20; ++i) {
+      truncated.add((truncated_normal(a, rng) - a) / beyond);
+      weighted.add(flux_weighted_normal(-a, rng) / flux);
+    }
+    CHECK(std::abs(truncated.z(1)), <, 4.5);  // 14 tests: 1e-4 together
+    CHECK(std::abs(weighted.z(1)), <, 4.5);
+  }
 }
