@@ -34,7 +34,7 @@ def methods_of(scene):
     if scene.memories:
         methods += [Method(f"memory_{m}", f"memory {m}", "truth", memory=m) for m in MEMORIES]
     if scene.microfacet:
-        methods.append(Method("microfacet", "mean surface, microfacets", "truth", microfacet=True))
+        methods.append(Method("microfacet", "mean surface (mirrors: GGX)", "truth", microfacet=True))
     return methods
 
 

@@ -93,7 +93,7 @@ def bias_panel(axes, rows, title):
             100 * b["mean"], i, xerr=200 * b["mean_error"], color=COLORS.get(key, "#333333"), marker="o", ms=4, capsize=2
         )
     axes.axvline(0, color="#888888", lw=0.8)
-    axes.set_yticks(range(len(rows)), [label for _, label, _ in rows])
+    axes.set_yticks(range(len(rows)), [label for _, label, _ in rows], fontsize=7)
     axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.set_xlabel("bias of the mean, % (± 2 standard errors)")
     axes.set_title(title, loc="left")
@@ -104,7 +104,7 @@ def scene_plot(samplers, approximations, paper=None):
     with plt.rc_context(STYLE):
         panels = 1 + bool(approximations)
         width = 4.4 * panels + 3.3
-        figure, axes = plt.subplots(1, panels + 1, figsize=(width, 3.1), width_ratios=[4.4] * panels + [2.4], squeeze=False)
+        figure, axes = plt.subplots(1, panels + 1, figsize=(width, 3.3), width_ratios=[4.4] * panels + [2.4], squeeze=False)
         error_panel(axes[0, 0], samplers, "Error against time", paper)
         if approximations:
             error_panel(axes[0, 1], approximations, "Approximations, against memory global")

@@ -165,7 +165,7 @@ def main_table(found):
             what = f"{row['reference']['title']}, {whole(row['reference']['samples'])} samples a pixel"
             references.setdefault(what, []).append(row["title"])
     text = "; ".join(f"{html.escape(what)} (for {html.escape(', '.join(of))})" for what, of in references.items())
-    text = f"References: {text}.{''.join(f'<br>{html.escape(t)} is refused: {html.escape(why)}' for t, why in refused)}"
+    text = f"References: {text}.{''.join(f'<br>{html.escape(t)}: {html.escape(why)}' for t, why in refused)}"
     return f'{table(columns, rows)}<p class="note">{text}</p>'
 
 
@@ -185,7 +185,7 @@ def scene_section(known, found):
     scene = found["scene"]
     there = [r for r in found["rows"] if "found" in r]
     groups = [[(r["key"], r["title"], r["found"]) for r in there if r["group"] == g] for g in ("sampler", "truth")]
-    plot = plots.scene_plot(*groups, paper_points(known, found))
+    plot = plots.scene_plot(*groups, paper_points(known, found)) if there else ""
     head = f'<div class="head"><img src="{plots.picture(found["picture"])}" alt=""><div><h2>{html.escape(scene.title)}</h2>'
     head += f"<div>{html.escape(scene.what)}</div></div></div>"
     return f"{head}{plot}{main_table(found)}<details><summary>Operations, memory</summary>{counts_table(found)}</details>"
@@ -260,7 +260,7 @@ def write(known, path):
     text += f"<p class=note>{known['effort']} run of {known['begun']}, module {known['module']}; {html.escape(known['processor'])}, "
     text += f"{known['threads']} threads, yardstick {number(known['yardstick'])} exponentials per second. Seconds are those of "
     text += "one core. Error is relMSE, mean of (pixel − reference)² / (reference² + .01) on luminance, the reference's own "
-    least = min(r["reference"]["samples"] / r["cell"]["samples"][-1] for _, r in measured(known))
+    least = min(r["reference"]["samples"] / r["cell"]["samples"][-1] for _, r in measured(known)) if measured(known) else 0
     text += f"noise taken off. References have at least {least:.0f} times the samples, of another sampler where there is one.</p>"
     text += "<h2>What is found</h2>" + findings(known)
     text += rates_section(known) + calibration_section(known)

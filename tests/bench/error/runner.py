@@ -97,17 +97,8 @@ def preview(folder, scene, effort, files):
     return np.load(path)
 
 
-def run(quick=False, again=False):
-    """All of it, as one dict that the report shows."""
-    effort = QUICK if quick else FULL
-    folder = OUT / effort.name
-    files = folder / "files"
-    known = begin(folder, again)
-    scenes, missing = available()
-    plan = [(scene, method) for scene in scenes for method in methods_for(scene, effort)]
-    needed = {(s.name, reference_of(s, m).key) for s, m in plan}
-    bar = Bar(len(plan) + REFERENCE_WEIGHT * len(needed) + len(scenes))
-    cells = {}
+def measure_all(plan, effort, folder, files, bar, cells, references):
+    """Fills cells and references, by (scene, method) and (scene, reference)."""
     for scene, method in plan:
         bar.show(f"{scene.name}, {method.title}")
         cells[scene.name, method.key] = cell_of(scene, method, effort, folder / "cells")
@@ -117,7 +108,6 @@ def run(quick=False, again=False):
         cell = cells[scene.name, method.key][0]
         key = scene.name, reference_of(scene, method).key
         largest[key] = max(largest.get(key, 0), *cell.get("samples", [0]))
-    references = {}
     for scene, method in plan:
         reference = reference_of(scene, method)
         key = scene.name, reference.key
@@ -129,6 +119,23 @@ def run(quick=False, again=False):
             lambda fraction, _, what=what: bar.show(what, REFERENCE_WEIGHT * fraction),
         )  # fmt: skip
         bar.step(REFERENCE_WEIGHT, what)
+
+
+def run(quick=False, again=False):
+    """All of it, as one dict that the report shows."""
+    effort = QUICK if quick else FULL
+    folder = OUT / effort.name
+    files = folder / "files"
+    known = begin(folder, again)
+    scenes, missing = available()
+    plan = [(scene, method) for scene in scenes for method in methods_for(scene, effort)]
+    needed = {(s.name, reference_of(s, m).key) for s, m in plan}
+    bar = Bar(len(plan) + REFERENCE_WEIGHT * len(needed) + len(scenes))
+    cells, references = {}, {}
+    try:
+        measure_all(plan, effort, folder, files, bar, cells, references)
+    except KeyboardInterrupt:
+        print("\nstopped: the page shows what there is; the next call goes on", file=sys.stderr)
     found = []
     for scene in scenes:
         found.append(numbers(scene, effort, cells, references) | {"picture": preview(folder, scene, effort, files)})
@@ -145,11 +152,14 @@ def run(quick=False, again=False):
 
 def numbers(scene, effort, cells, references):
     rows, calibrated = [], None
+    nothing = {"refused": "not measured yet"}, None
     for method in methods_for(scene, effort):
-        cell, images = cells[scene.name, method.key]
+        reference = reference_of(scene, method)
+        cell, images = cells.get((scene.name, method.key), nothing)
+        if images is not None and (scene.name, reference.key) not in references:
+            cell, images = nothing
         row = {"key": method.key, "title": method.title, "group": method.group, "cell": cell}
         if images is not None:
-            reference = reference_of(scene, method)
             image, noise, samples = references[scene.name, reference.key]
             row["reference"] = {"title": reference.title, "samples": samples}
             row["found"] = evaluate(cell, images, image, noise)
