@@ -90,8 +90,11 @@ def render_frame(engine, depsgraph):
     entry = statistics.record(
         scene.name, view_layer.name, scene.frame_current, session, result, plan, state.warnings
     )
-    if scene.gpis.write_statistics and session.stop != "cancelled":
-        statistics.write(entry, _beside_image(engine, scene, view_layer))
+    # An F12 in the window writes no picture by itself, so there is nothing to write beside; the panel saves it.
+    if scene.gpis.write_statistics and not watched and session.stop != "cancelled":
+        path = _beside_image(engine, scene, view_layer)
+        if path is not None:
+            statistics.write(entry, path)
 
 
 def _run(engine, session, view_layer, width, height):
@@ -131,17 +134,21 @@ def _run(engine, session, view_layer, width, height):
 
 
 def _stamp(engine, session):
-    """The end of the history as metadata of the image."""
+    """The history of the render, and its end in words, as metadata of the image."""
     end = session.history[-1]
     whole = engine.get_result()
     whole.stamp_data_add_field("gpis.samples", str(end["samples"]))
     whole.stamp_data_add_field("gpis.seconds", f"{end['seconds']:.2f}")
     whole.stamp_data_add_field("gpis.estimated_error", str(end["estimated_error"]))
+    whole.stamp_data_add_field("gpis.history", statistics.history_text(session.history))
 
 
 def _beside_image(engine, scene, view_layer):
-    """The image's path with .json for its extension; Blender numbers the frames of an animation only."""
+    """The image's path with .json for its extension; Blender numbers the frames of an animation only. None where the output
+    path names a folder and no file, as in every new scene: no picture that somebody keeps is called "/tmp/.png"."""
     render = scene.render
+    if not engine.is_animation and (not render.filepath or render.filepath.endswith(("/", "\\"))):
+        return None
     path = render.frame_path(frame=scene.frame_current) if engine.is_animation else render.filepath
     path = bpy.path.abspath(path)
     if path.endswith(render.file_extension):

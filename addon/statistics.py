@@ -60,6 +60,13 @@ def write(entry, path):
         file.write("\n")
 
 
+def history_text(history):
+    """Error against run time on one line of JSON, for the image's metadata: a row [seconds, samples, estimated_error] each
+    round; the error, a relMSE, is null where it is unknown."""
+    rows = [[round(row["seconds"], 3), row["samples"], row["estimated_error"]] for row in history]
+    return json.dumps(plain(rows), allow_nan=False)
+
+
 def plain(value):
     """Only what JSON knows: numpy scalars and arrays, tuples and objects' dicts are turned into it, inf and NaN to None."""
     if isinstance(value, dict):

@@ -81,9 +81,9 @@ class GPIS_SceneProperties(bpy.types.PropertyGroup):
     )
     write_statistics: BoolProperty(
         name="Write beside the Image",
-        description="Write the statistics of each frame as JSON to the output path, beside the image. What is not known, "
-        "such as the error after a single sample, is null there",
-        default=False,
+        description="Animations and renders in the background write statistics, plan and the error of every round as "
+        "JSON to the output path, beside each image. What is not known, such as the error after a single sample, is null",
+        default=True,
     )
 
 

@@ -55,6 +55,11 @@ def test_passes(stage, tmp_path):
     assert np.allclose(albedo[0][inner] / albedo[2][inner], 2, rtol=1e-3) | np.any(albedo[0] > 0.6)
     assert np.all(ours[prefix + "Variance.R"] >= 0) and ours[prefix + "Variance.R"].max() > 0
     assert attributes["gpis.samples"].decode().rstrip("\0") in {"32", "32.0"}
+    history = json.loads(attributes["gpis.history"].decode().rstrip("\0"))
+    assert [samples for _, samples, _ in history] == [16, 32]
+    assert 0 < history[0][0] <= history[1][0], "seconds since the start"
+    error = history[-1][2]
+    assert error > 0 and error == float(attributes["gpis.estimated_error"].decode().rstrip("\0"))
 
 
 def _inner(depth):
@@ -103,7 +108,6 @@ def test_animation_writes_every_frame(stage, tmp_path):
     box.location.x = 2
     box.keyframe_insert("location", frame=3)
     stage.frame_start, stage.frame_end = 1, 3
-    stage.gpis.write_statistics = True
     support.image_settings(stage)
     stage.render.filepath = str(tmp_path / "frame_")
     bpy.ops.render.render(animation=True)
@@ -114,8 +118,20 @@ def test_animation_writes_every_frame(stage, tmp_path):
         assert json.loads((tmp_path / f"frame_{frame:04d}.json").read_text())["frame"] == frame
 
 
+def test_statistics_can_be_left_out(stage, tmp_path):
+    stage.gpis.write_statistics = False
+    support.picture(stage, tmp_path)
+    assert not list(tmp_path.glob("*.json")) and list(tmp_path.glob("*.exr"))
+
+
+def test_no_statistics_without_a_name_for_the_image(stage, tmp_path):
+    stage.render.filepath = f"{tmp_path}/"
+    bpy.ops.render.render()
+    assert not list(tmp_path.iterdir())
+
+
 def test_statistics_beside_the_image_and_by_operator(stage, tmp_path):
-    stage.gpis.write_statistics = True
+    """Renders in the background write them unasked."""
     support.picture(stage, tmp_path)
     entry = json.loads((tmp_path / "GPIS-0.json").read_text())
     assert entry["stop"] == "samples" and [row["samples"] for row in entry["history"]] == [16, 32]
