@@ -11,6 +11,7 @@ KERNELS = {
     "locally periodic": gn.LocallyPeriodic(1.5, 2.5, [0.6, 0.8, 0], 1.2),
     "plane wave": gn.PlaneWave([1.0, 0.5, 0.3]),
     "sum with a rough term": 0.6 * gn.SquaredExponential(1) + 0.4 * gn.Matern(1.5, 1),
+    "sum of rough terms": 0.5 * gn.Matern(1.5, 1) + 0.3 * gn.Matern(2.5, 0.6) + 0.2 * gn.Wong(0.8),
 }
 SMOOTH = ["spectral", "nystrom", "dense", "realisation"]
 ROUGH = ["markov", "dense", "realisation"]
@@ -22,11 +23,12 @@ SAMPLERS = {
     "rational quadratic": SMOOTH,
     "locally periodic": SMOOTH,
     "plane wave": SMOOTH,
-    "sum with a rough term": ["dense", "realisation"],
+    "sum with a rough term": ROUGH,
+    "sum of rough terms": ROUGH,
 }
 SERVED = [(kernel, sampler) for kernel, samplers in SAMPLERS.items() for sampler in samplers]
 # `dense` of these draws every line from its own covariance.
-JOINT = ["locally periodic", "plane wave", "sum with a rough term"]
+JOINT = ["locally periodic", "plane wave", "sum with a rough term", "sum of rough terms"]
 
 
 def factorises(kernel, sampler):
@@ -35,4 +37,6 @@ def factorises(kernel, sampler):
 
 def worth(kernel, sampler, n):
     """n rays of the fast samplers, fewer of the slow ones."""
-    return n // 100 if sampler == "realisation" else n // 30 if factorises(kernel, sampler) else n
+    if sampler == "realisation":
+        return n // (500 if kernel.startswith("sum") else 100)
+    return n // 30 if factorises(kernel, sampler) else n

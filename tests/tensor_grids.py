@@ -61,3 +61,16 @@ def rotating(x):
     c, s = np.cos(x * np.pi / 6), np.sin(x * np.pi / 6)
     r = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     return entries(r @ np.diag([3, 1 / 3, 1]) @ r.T)
+
+
+def smooth_step(x):
+    x = np.clip(x, 0, 1)
+    return x * x * (3 - 2 * x)
+
+
+# Length scales that vary as strongly as the samplers are asked to follow.
+VARYING = {
+    "length e^{x/4}": along_x(lambda x: isotropic(np.exp(0.25 * x)), 8),
+    "length times 4 within one": along_x(lambda x: isotropic(4 ** smooth_step(x - 2)), 8, 641),
+    "rotating 3:1": along_x(rotating, 8),
+}

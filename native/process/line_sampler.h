@@ -39,6 +39,7 @@ class LineSampler {
 std::unique_ptr<LineSampler> make_zero(const GaussianProcess& process, const Box3& bounds);
 std::unique_ptr<LineSampler> make_convolution(const GaussianProcess& process, const Box3& bounds);
 std::unique_ptr<LineSampler> make_markov(const GaussianProcess& process, const Box3& bounds);
+std::unique_ptr<LineSampler> make_sum(const GaussianProcess& process, const Box3& bounds);
 std::unique_ptr<LineSampler> make_ornstein_uhlenbeck(const GaussianProcess& process, const Box3&);
 std::unique_ptr<LineSampler> make_spectral(const GaussianProcess& process, const Box3& bounds);
 std::unique_ptr<LineSampler> make_dense(const GaussianProcess& process, const Box3& bounds);

@@ -23,7 +23,7 @@ MarkovPath<Model>::Plan::Plan(const GaussianProcess& process, const Box3&)
 
 template <class Model>
 void MarkovPath<Model>::at(long cell, double t, Rng& rng, double& g, double& dg) {
-  const double q = std::clamp(line_.q(t), cell * kStep, (cell + 1) * kStep);
+  const double q = std::clamp(line_.q(t), cell * width_, (cell + 1) * width_);
   const auto right = std::upper_bound(nodes_.begin(), nodes_.end(), q,
                                       [](double x, const Node& node) { return x < node.q; });
   const auto left = right - 1;

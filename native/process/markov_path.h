@@ -17,7 +17,8 @@ class MarkovPath {
   static constexpr double kLastStep = 0;
   struct Plan {
     Plan(const GaussianProcess& process, const Box3& bounds);
-    double correlation_error = 1e-14;  // rounding
+    explicit Plan(const Term& term) : line(term) {}  // of a path of variance 1
+    double correlation_error = 1e-14;                // rounding
     RadialLine::Plan line;
   };
 
@@ -25,12 +26,21 @@ class MarkovPath {
              Counters& counters) {
     counters_ = &counters;
     line_.reset(plan.line, line, anchor);
+    width_ = kStep;
+    transition_ = &kTables.step;
     step_ = kStep / line_.inverse_length();
     nodes_.clear();
     pull_ = 0;
   }
 
   double step() const { return step_; }
+  // After a reset: shorter cells than its own, where paths that are added up share them.
+  void shorten(double step) {
+    step_ = step;
+    width_ = step * line_.inverse_length();
+    if (width_ > 0) shorter_ = Transition<Model>(Model::kRate * width_);
+    transition_ = &shorter_;
+  }
   double value_mean() const { return 0; }
   double value_deviation() const { return 1; }
   void slope_law(double, double& mean, double& deviation) const {
@@ -57,10 +67,10 @@ class MarkovPath {
   }
 
   void prepare(long cell, Rng& rng, Counters& counters) {
-    const double left = cell * kStep;
+    const double left = cell * width_;
     if (nodes_.back().q < left)
       advance(left, Transition<Model>(Model::kRate * (left - nodes_.back().q)), rng, counters);
-    if (nodes_.back().q < left + kStep) advance(left + kStep, kTables.step, rng, counters);
+    if (nodes_.back().q < left + width_) advance(left + width_, *transition_, rng, counters);
   }
   void at_right(long, double& g, double& dg) const { read(nodes_.back(), g, dg); }
   void at(long cell, double t, Rng& rng, double& g, double& dg);
@@ -73,7 +83,7 @@ class MarkovPath {
 
  private:
   using Vector = typename Model::Vector;
-  static constexpr double kStep = 0.25;  // of a cell, in length scales
+  static constexpr double kStep = 0.25;  // of its own cells, in length scales
   // Narrower intervals are their cubic, off by 1e-10 standard deviations at most.
   static constexpr double kFinest = Model::kPower > 2 ? 1e-4 : 1e-7;
   static constexpr int kLevels = 10;  // halvings of a cell that are tabulated
@@ -121,7 +131,9 @@ class MarkovPath {
   }
 
   RadialLine line_;
-  double step_ = 1, pull_ = 0;
+  double step_ = 1, width_ = kStep, pull_ = 0;     // of a cell, per t and in length scales
+  const Transition<Model>* transition_ = nullptr;  // over a cell
+  Transition<Model> shorter_;
   Counters* counters_ = nullptr;
   std::vector<Node> nodes_;  // in increasing order
 };

@@ -10,6 +10,7 @@
 #include "process/covariance.h"
 #include "process/gaussian_process.h"
 #include "process/realisation.h"
+#include "process/sum_path.h"
 
 namespace gpis {
 namespace {
@@ -54,10 +55,12 @@ Choice choose(const GaussianProcess& process, Sampler asked) {
     refuse(
         "this sampler serves length scales that are the same everywhere; with an anisotropy take "
         "'auto', 'nystrom', 'dense' or 'realisation'.");
+  const bool sum = !process.anisotropy && terms && SumPath::serves(*terms);
   switch (asked) {
     case Sampler::convolution:
       return {make_convolution, "convolution: asked for"};
     case Sampler::markov:
+      if (sum) return {make_sum, "markov: asked for"};
       return {process.kernel->differentiable() ? make_markov : make_ornstein_uhlenbeck,
               "markov: asked for"};
     case Sampler::spectral:
@@ -85,6 +88,7 @@ Choice choose(const GaussianProcess& process, Sampler asked) {
   const auto smooth = [](const Term& term) { return term.radial.smooth(); };
   if (!process.anisotropy && terms && std::all_of(terms->begin(), terms->end(), smooth))
     return {make_spectral, "spectral: a sum of smooth terms"};
+  if (sum) return {make_sum, "markov: a sum of independent paths, of its smooth terms by waves"};
   const std::string why = process.anisotropy
                               ? "length scales vary, lines are drawn from their own covariance"
                               : "no other sampler serves " + process.kernel->describe();

@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "core/sincos.h"
+#include "process/across.h"
 #include "process/march_sampler.h"
 
 namespace gpis {
@@ -282,30 +283,18 @@ PathGradient SpectralPath::gradient(double t, double, double, Rng&) {
   angle_ = slope_ * turned_cos_ - value_ * turned_sin_;
   PathGradient law;
   law.mean = waves_gradient(angle_);
-  const Frame frame(normalize(direction_));
-  double ss = 0, st = 0, tt = 0, all = 0;
+  Across across(direction_);
   for (const TermLine& line : terms_) {
     const double tau = t - anchor_, q = line.spectrum ? tau * line.inverse_length : 0;
     const double c = remembered_ ? line.term->radial.transverse(q) : 0;
     const double cosine = c * std::cos(line.turn * tau), sine = c * std::sin(line.turn * tau);
     for (int m = 0; m < 3; ++m) {
-      const Vec3& across = line.across[m];
       if (remembered_)
-        law.mean += across * (cosine * line.normal_cos[m] + sine * line.normal_sin[m]);
-      const double s = dot(across, frame.s), u = dot(across, frame.t), rest = (1 - c) * (1 + c);
-      ss += rest * s * s;
-      st += rest * s * u;
-      tt += rest * u * u;
-      all += s * s + u * u;
+        law.mean += line.across[m] * (cosine * line.normal_cos[m] + sine * line.normal_sin[m]);
+      across.add(line.across[m], (1 - c) * (1 + c));
     }
   }
-  law.free_variance = all > 0 ? (ss + tt) / all : 0;
-  const bool swap = tt > ss;
-  const double first = std::sqrt(swap ? tt : ss), cross = first > 0 ? st / first : 0;
-  const double second = std::sqrt(std::max(0.0, (swap ? ss : tt) - cross * cross));
-  const Vec3 &a = swap ? frame.t : frame.s, &b = swap ? frame.s : frame.t;
-  law.b1 = a * first + b * cross;
-  law.b2 = b * second;
+  across.write(law);
   return law;
 }
 

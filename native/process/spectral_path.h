@@ -43,6 +43,11 @@ class SpectralPath {
              Counters& counters);
 
   double step() const { return step_; }
+  // After a reset: shorter cells than its own, where paths that are added up share them.
+  void shorten(double step) {
+    step_ = step;
+    turn_by(step_, step_cos_, step_sin_);
+  }
   double value_mean() const { return 0; }
   double value_deviation() const { return std::sqrt(plan_->variance); }
   void slope_law(double, double& mean, double& deviation) const {

@@ -2,11 +2,15 @@
 machines compare. Only rays that meet the uncertain region count; camera and secondary rays apart. Times are those of
 the processor, one thread."""
 
+import sys
 import time
 from pathlib import Path
 
 import gpis_native as gn
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from tensor_grids import VARYING  # noqa: E402
 
 SHARED = Path(__file__).parents[3] / "shared" / "data" / "gpis-light-transport"
 SAMPLERS = ("convolution", "markov", "spectral", "nystrom", "dense", "realisation")
@@ -112,4 +116,21 @@ def bench_bunny():
     rows = []
     for sampler in SAMPLERS:
         rows += camera_and_secondary(gp, np.tile(eye, (n, 1)), directions, sampler, n, rng, repetitions=3)
+    return rows
+
+
+def bench_varying_lengths():
+    """Planar mean with a tensor field A(x), what `auto` picks: the stated error of the correlation and the cost."""
+    rng, n = np.random.default_rng(1), 2000
+    direction = np.array([0.9, 0.1, -0.3])
+    origins = np.column_stack([rng.uniform(-1.5, 0, n), rng.uniform(-1, 1, n), np.full(n, 1.5)])
+    directions = np.tile(direction / np.linalg.norm(direction), (n, 1))
+    rows = []
+    for name, field in VARYING.items():
+        for kernel in (gn.SquaredExponential(1), gn.Matern(1.5, 1)):
+            bounds = ((-2, -2, -2), (8, 2, 2))
+            gp = gn.GaussianProcess(gn.PlaneField([0, 0, 0], [0, 0, 1]), 0.3, kernel, anisotropy=field, bounds=bounds)
+            plan, (row, _) = gp.plan(), rate(gp, origins, directions, 3)
+            about = {"field": name, "kernel": repr(kernel), "sampler": plan["sampler"].split(":")[0]}
+            rows.append(about | {"correlation_error": float(plan["correlation_error"])} | row)
     return rows

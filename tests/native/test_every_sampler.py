@@ -1,6 +1,6 @@
 """What has an exact answer, over every sampler that serves a kernel (design oracles, numbered as there), and what each sampler
-does not do (counters). The survivals of oracles 5 and 6 and the gradients of 9 are in test_process.py, test_markov.py and
-test_realisation_path.py."""
+does not do (counters). Oracles 2 and 12 are in test_rays.py, 10 in test_realisation.py; the survivals of 5 and 6 and what few
+samplers have (7, 8, 17) in test_process.py, test_markov.py and test_realisation_path.py."""
 
 from math import erfc, pi, sqrt
 
@@ -8,7 +8,7 @@ import gpis_native as gn
 import numpy as np
 import pytest
 from line_samplers import KERNELS, SERVED, factorises, worth
-from statistics_checks import SIGNIFICANCE, check_proportion, check_z
+from statistics_checks import SIGNIFICANCE, check_proportion, check_same_distribution, check_z
 
 pytestmark = pytest.mark.stats
 every = pytest.mark.parametrize(("kernel", "sampler"), SERVED)
@@ -56,6 +56,100 @@ def test_mean_excursion(kernel, sampler, n, seed):
     # Longer ones than the line are rare, and not much longer.
     beyond = 5 * np.mean(t == 29)
     assert abs(t.mean() - pi / sqrt(KERNELS[kernel].derivative_variance(X))) < 5.33 * t.std() / sqrt(n) + beyond
+
+
+@every
+def test_reciprocity_of_free_flight(kernel, sampler, n, seed):
+    """Oracle 4: P(T <= t from a random outside point) = (crossing rate / P(f > 0)) ∫₀ᵗ S(s) ds, S of an excursion."""
+    n, t, mean = worth(kernel, sampler, n), 4.0, 0.3
+    gp = gn.GaussianProcess(mean, 1, KERNELS[kernel], bounds=line(8))
+    state = {"value": np.zeros(n), "gradient": np.tile(X, (n, 1))}
+    free = gn.first_hits(gp, *along_x(n), t, sampler=sampler, seed=seed)["t"]
+    excursion = gn.first_hits(gp, *along_x(n), t, memory="renewal", start=state, sampler=sampler, seed=seed + 1)["t"]
+    slope = sqrt(KERNELS[kernel].derivative_variance(X))
+    rate = slope / (2 * pi) * np.exp(-(mean**2) / 2) / (0.5 * erfc(-mean / sqrt(2)))
+    lasted = np.minimum(excursion, t)
+    p = np.isfinite(free).mean()
+    check_z(p, rate * lasted.mean(), sqrt(p * (1 - p) / n + rate**2 * lasted.var() / n))
+
+
+RADIAL = ("squared exponential", "matern 3/2", "matern 5/2", "wong", "rational quadratic")
+
+
+@pytest.mark.parametrize(("kernel", "sampler"), [p for p in SERVED if p[0] in RADIAL])
+def test_transverse_gradient_correlation(kernel, sampler, n, seed):
+    """Oracle 9: a remembered transverse gradient decays as c(q) = -κ'(q)/(qλ₂); SE e^{-q²/2}, Matérn 3/2 e^{-√3q}."""
+    n, start, k = worth(kernel, sampler, 4 * n), np.array([0.7, 1.5, -2.0]), KERNELS[kernel]
+    gp = gn.GaussianProcess(0, 1, k, bounds=line(12))
+    state = {"value": np.zeros(n), "gradient": np.tile(start, (n, 1))}
+    hits = gn.first_hits(gp, *along_x(n), 9, start=state, sampler=sampler, seed=seed)
+    hit = np.isfinite(hits["t"])
+    m, t, lambda2 = hit.sum(), hits["t"][hit], k.derivative_variance(X)
+    known = {"squared exponential": lambda q: np.exp(-q * q / 2), "matern 3/2": lambda q: np.exp(-sqrt(3) * q)}
+    gradient = k.gradient(t[:, None] * X, np.zeros((1, 3)))[:, 0, 0]
+    c = known[kernel](t) if kernel in known else -gradient / (t * lambda2)
+    for axis in (1, 2):
+        scaled = (hits["gradient"][hit, axis] - c * start[axis]) / np.sqrt(lambda2 * (1 - c**2))
+        check_z(scaled.mean(), 0, 1 / sqrt(m))
+        check_z((scaled**2).mean(), 1, sqrt(2 / m))
+        check_z((scaled * c).mean(), 0, sqrt((c**2).mean() / m))
+
+
+SLOPES_ALIKE = (*RADIAL, "sum with a rough term", "sum of rough terms")
+
+
+@pytest.mark.parametrize(("kernel", "sampler"), [p for p in SERVED if p[0] in SLOPES_ALIKE])
+def test_normals_and_slopes_over_all_crossings(kernel, sampler, n, seed):
+    """Oracle 11: normals have density (-n·d)₊/π, so that -n·d has 2u, and slopes are Rayleigh: over a stretch from random
+    outside points that is too short for the first crossings to differ from all of them."""
+    n, s = worth(kernel, sampler, 4 * n), sqrt(KERNELS[kernel].derivative_variance(X))
+    gp = gn.GaussianProcess(0, 1, KERNELS[kernel], bounds=line(8))
+    hits = gn.first_hits(gp, *along_x(n), 0.2 / s, sampler=sampler, seed=seed)
+    g = hits["gradient"][np.isfinite(hits["t"])]
+    rng = np.random.default_rng(seed)
+    check_proportion(len(g), n, 0.2 / pi, 0.02 * 0.2 / pi, "oracle 2")
+    check_same_distribution(-g[:, 0] / np.linalg.norm(g, axis=1), np.sqrt(rng.uniform(size=100_000)), "n·d")
+    check_same_distribution(-g[:, 0] / s, rng.rayleigh(size=100_000), "slope")
+
+
+LONG = {
+    "squared exponential": gn.SquaredExponential,
+    "matern 3/2": lambda length: gn.Matern(1.5, length),
+    "matern 5/2": lambda length: gn.Matern(2.5, length),
+    "wong": gn.Wong,
+    "rational quadratic": lambda length: gn.RationalQuadratic(0.7, length),
+    "locally periodic": lambda length: gn.LocallyPeriodic(length, length, [0.6, 0.8, 0], 1.0),
+    "plane wave": lambda length: gn.PlaneWave([1 / length, 0, 0]),
+    "sum with a rough term": lambda length: 0.6 * gn.SquaredExponential(length) + 0.4 * gn.Matern(1.5, length),
+    "sum of rough terms": lambda length: 0.6 * gn.Wong(length) + 0.4 * gn.Matern(2.5, length),
+}
+
+
+@every
+def test_infinite_length_scale_is_one_normal(kernel, sampler, n, seed):
+    """Oracle 14: f = μ + σξ with one ξ; a sphere is missed with probability Φ((b - R)/σ)."""
+    n = worth(kernel, sampler, n)
+    gp = gn.GaussianProcess(gn.SphereField([0, 0, 0], 1), 0.2, LONG[kernel](1e4), bounds=((-3,) * 3, (3,) * 3))
+    for b in (0.9, 1.1):
+        origins, directions = np.tile([b, 0.0, 2.8], (n, 1)), np.tile([0.0, 0, -1.0], (n, 1))
+        hits = gn.first_hits(gp, origins, directions, 6, sampler=sampler, seed=seed)
+        # Starts are outside but for 1e-23.
+        check_proportion(np.sum(np.isinf(hits["t"])), n, 0.5 * erfc((1 - b) / 0.2 / sqrt(2)), what=f"b = {b}")
+
+
+@pytest.mark.parametrize(
+    ("kernel", "sampler"), [p for p in SERVED if p[0] in ("squared exponential", "matern 5/2", "rational quadratic")]
+)
+def test_rare_hits_are_exponential(kernel, sampler, n, seed):
+    """Oracle 16: μ = 3σ, free flights of rate ν/Φ(μ/σ), ν the one-sided Rice rate; lines much longer than the memory are in
+    test_rays.py. Paths that dip below 0 often do so twice: .5% of the rate at this height, more where g'' jumps about."""
+    n, k = worth(kernel, sampler, 4 * n), KERNELS[kernel]
+    gp = gn.GaussianProcess(3.0, 1, k, bounds=line(12))
+    t = gn.first_hits(gp, *along_x(n), 11, sampler=sampler, seed=seed)["t"]
+    rate = sqrt(k.derivative_variance(X)) / (2 * pi) * np.exp(-4.5) / (0.5 * erfc(-3 / sqrt(2)))
+    at = np.array([3.0, 7.0, 11.0])
+    survival = np.exp(-rate * at)
+    check_proportion([np.sum(t > x) for x in at], n, survival, 0.02 * rate * at * survival)
 
 
 @pytest.mark.parametrize("slope", [1.5, 0.0, -1.5])
@@ -164,3 +258,23 @@ def test_far_rays_draw_nothing_and_stationary_kernels_factorise_nothing(kernel, 
     assert near["line_skipped"] == 0 and near["line_segments"] == n
     assert near["line_normals"] >= 2 * n and near["line_evaluations"] > n and near["mean_lookups"] > n
     assert near["factorisations"] == (n if factorises(kernel, sampler) else 0)
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+@pytest.mark.parametrize("memory", ["none", "renewal", "renewal+"])
+def test_a_render_of_a_stationary_kernel_factorises_nothing_per_ray(kernel, memory, seed):
+    """The same for what `auto` picks, camera rays and those that go back; under global-n that counter moves."""
+    k, n = KERNELS[kernel], 40
+    gp = gn.GaussianProcess(gn.SphereField([0, 0, 0], 1), 0.05, k, bounds=((-1.5,) * 3, (1.5,) * 3))
+    origins, directions = np.tile([0.3, 0, 1.4], (n, 1)), np.tile([0.0, 0, -1], (n, 1))
+
+    def twice(memory):
+        first = gn.first_hits(gp, origins, directions, 10, memory=memory, seed=seed)
+        assert np.isfinite(first["t"]).all()
+        again = gn.first_hits(gp, first["position"], -directions, 10, memory=memory, start=first["state"], seed=seed)
+        return [hits["counters"] for hits in (first, again)]
+
+    twice(memory)  # tables that all rays share
+    for counters in twice(memory):
+        assert counters["factorisations"] == 0 and counters["line_normals"] > 0
+    assert twice("global-1")[1]["factorisations"] > 0

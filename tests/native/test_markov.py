@@ -163,42 +163,8 @@ def test_few_roots_are_missed(kernel, sampler, full_size, seed):
     assert np.sum(v[free].min(axis=1) < 0) < 1e-3 * n
 
 
-@pytest.mark.parametrize(("kernel", "sampler"), PAIRS)
-def test_reciprocity_of_free_flight(kernel, sampler, n, seed):
-    """Oracle 4: P(T <= t from a random outside point) = (crossing rate / P(f > 0)) ∫₀ᵗ S(s) ds, S of an excursion."""
-    from math import erf, sqrt
-
-    t, mean = 4.0, 0.3
-    gp, (origins, directions) = process(kernel, mean), along_x(n)
-    free = gn.first_hits(gp, origins, directions, t, sampler=sampler, seed=seed)["t"]
-    excursion = gn.first_hits(gp, origins, directions, t, memory="renewal", start=on_surface(n), sampler=sampler, seed=seed + 1)[
-        "t"
-    ]
-    rate = np.sqrt(gp_slope(kernel)) / (2 * np.pi) * np.exp(-(mean**2) / 2) / (0.5 * (1 + erf(mean / sqrt(2))))
-    lasted = np.minimum(excursion, t)
-    p = np.isfinite(free).mean()
-    check_z(p, rate * lasted.mean(), np.sqrt(p * (1 - p) / n + rate**2 * lasted.var() / n))
-
-
 def gp_slope(kernel):
     return KERNELS[kernel](1.0).derivative_variance([1, 0, 0])
-
-
-@pytest.mark.parametrize(("kernel", "sampler"), PAIRS)
-def test_transverse_gradient_correlation(kernel, sampler, n, seed):
-    """Oracle 9: a remembered transverse gradient decays as c(q) = -κ'(q)/(qλ₂); Matérn 3/2 e^{-√3q}."""
-    start = np.array([0.7, 1.5, -2.0])
-    hits = gn.first_hits(process(kernel), *along_x(n), 9, start=on_surface(n, start), sampler=sampler, seed=seed)
-    hit = np.isfinite(hits["t"])
-    m, t = hit.sum(), hits["t"][hit]
-    lambda2 = gp_slope(kernel)
-    gradient = KERNELS[kernel](1.0).gradient(t[:, None] * [1.0, 0, 0], np.zeros((1, 3)))[:, 0, 0]
-    c = np.exp(-np.sqrt(3) * t) if kernel == "matern 3/2" else -gradient / (t * lambda2)
-    for axis in (1, 2):
-        scaled = (hits["gradient"][hit, axis] - c * start[axis]) / np.sqrt(lambda2 * (1 - c**2))
-        check_z(scaled.mean(), 0, 1 / np.sqrt(m))
-        check_z((scaled**2).mean(), 1, np.sqrt(2 / m))
-        check_z((scaled * c).mean(), 0, np.sqrt((c**2).mean() / m))
 
 
 @pytest.mark.parametrize("kernel", KERNELS)

@@ -99,32 +99,6 @@ def test_conditioned_start_at_tiny_distances(sampler, finest, seed):
     check_z(ratio, 1, np.sqrt(2 / n))
 
 
-@pytest.mark.parametrize("sampler", EVERY)
-def test_transverse_gradient_correlation(sampler, n, seed):
-    """Oracle 9: a remembered transverse gradient decays as exp(-q²/2); its residual has variance 1 - exp(-q²)."""
-    n = worth("squared exponential", sampler, n)
-    origins, directions = along_x(n)
-    start = np.tile([0.7, 1.5, -2.0], (n, 1))
-    hits = gn.first_hits(
-        standard(),
-        origins,
-        directions,
-        9,
-        start={"value": np.zeros(n), "gradient": start},
-        sampler=sampler,
-        seed=seed,
-    )
-    hit = np.isfinite(hits["t"])
-    c = np.exp(-(hits["t"][hit] ** 2) / 2)
-    for axis in (1, 2):
-        residual = hits["gradient"][hit, axis] - c * start[0, axis]
-        scaled = residual / np.sqrt(1 - c**2)
-        m = hit.sum()
-        check_z(scaled.mean(), 0, 1 / np.sqrt(m))
-        check_z((scaled**2).mean(), 1, np.sqrt(2 / m))
-        check_z((scaled * c).mean(), 0, np.sqrt((c**2).mean() / m))
-
-
 @pytest.mark.parametrize("memory", ["renewal", "renewal+", "none"])
 def test_samplers_agree_over_a_curved_mean(memory, n, seed):
     """Two samplers, the same law of (t, gradient) at the first and the second hit (test_samplers_agree.py has the others)."""
@@ -184,21 +158,6 @@ def test_first_hit_of_explicit_realisations(sampler, full_size, seed):
     )
     hits = gn.first_hits(gp, *along_x(len(f)), 3, sampler=sampler, seed=seed)
     check_same_distribution(hits["t"], expected)
-
-
-@pytest.mark.parametrize("sampler", EVERY)
-def test_infinite_length_scale_is_one_normal(sampler, n, seed):
-    """Oracle 14: f = μ + σξ with one ξ; a sphere is missed with probability Φ((b - R)/σ)."""
-    from math import erf, sqrt
-
-    gp = gn.GaussianProcess(gn.SphereField([0, 0, 0], 1), 0.2, gn.SquaredExponential(1e4), bounds=((-3, -3, -3), (3, 3, 3)))
-    n = worth("squared exponential", sampler, n // 4)
-    for b in (0.7, 1.0, 1.2):
-        origins = np.tile([b, 0.0, 2.9], (n, 1))
-        hits = gn.first_hits(gp, origins, np.tile([0.0, 0, -1], (n, 1)), 6, sampler=sampler, seed=seed)
-        start_outside = 0.5 * (1 + erf(1.9 / 0.2 / sqrt(2)))
-        missed = (0.5 * (1 + erf((b - 1) / 0.2 / sqrt(2)))) / start_outside
-        check_proportion(np.sum(np.isinf(hits["t"])), n, missed, what=f"b = {b}")
 
 
 @pytest.mark.parametrize("sigma", [0.0, 1e-12])

@@ -8,7 +8,7 @@ import gpis_native as gn
 import numpy as np
 import pytest
 from line_samplers import KERNELS, SERVED, worth
-from statistics_checks import check_proportion, check_same_distribution, check_z
+from statistics_checks import SIGNIFICANCE, check_proportion, check_same_distribution, check_z
 
 pytestmark = pytest.mark.stats
 
@@ -31,9 +31,7 @@ def rays(n, origin, direction):
     return np.tile(np.asarray(origin, float), (n, 1)), np.tile(direction, (n, 1))
 
 
-@pytest.mark.parametrize(
-    ("name", "sampler"), [p for p in SERVED if p[0] in ("squared exponential", "matern 5/2", "wong", "rational quadratic")]
-)
+@pytest.mark.parametrize(("name", "sampler"), SERVED)
 def test_crossing_rate_over_a_sloping_mean_and_deviation(name, sampler, n, seed):
     """Oracle 2: down-rate (1/σ)φ(μ/σ)[sφ(m/s) - mΦ(-m/s)], m = d·∇μ - (μ/σ)d·∇σ, over a stretch too short for two."""
     n, h, kernel = worth(name, sampler, 4 * n), 0.02, KERNELS[name]
@@ -45,7 +43,8 @@ def test_crossing_rate_over_a_sloping_mean_and_deviation(name, sampler, n, seed)
     m, s = -0.8 - mu / s0 * 0.7, s0 * sqrt(kernel.derivative_variance([1, 0, 0]))
     rate = density(mu / s0) / s0 * (s * density(m / s) - m * normal_cdf(-m / s))
     # Paths that cross twice on a stretch this short: about h² in relative terms, h for kernels without g''.
-    check_proportion(np.isfinite(hits["t"]).sum(), n, rate * h / normal_cdf(0.3 / 0.5), 0.005 * rate * h)
+    twice = 0.01 if "3/2" in name or "sum" in name else 0.005
+    check_proportion(np.isfinite(hits["t"]).sum(), n, rate * h / normal_cdf(0.3 / 0.5), twice * rate * h)
 
 
 @pytest.mark.parametrize("kernel", [gn.SquaredExponential(0.3), gn.Matern(1.5, 0.3)])
@@ -199,6 +198,24 @@ def test_rare_hits_are_exponential(kernel, seed):
     # Paths that dip below 0 often do so twice: .5% of the rate at this height.
     survival = np.exp(-rate * t)
     check_proportion([np.sum(hits["t"] > s) for s in t], n, survival, 0.01 * rate * t * survival)
+
+
+@pytest.mark.parametrize("sampler", ["spectral", "nystrom", "dense", "realisation"])
+def test_visible_normals_by_other_samplers(sampler, n, seed, figure):
+    """Oracle 12 at 45°, α = .5, isotropic: Kolmogorov's distance of n·ω to its law less the .004 by which that law is off."""
+    n, alpha, edges = worth("squared exponential", sampler, n), 0.5, np.linspace(0, 1, 2001)
+    direction = np.array([-1.0, 0, -1.0]) / sqrt(2)
+    sigma, bounds = alpha * 0.1 / sqrt(2), ((-0.8, -0.3, -0.25), (0.8, 0.3, 0.25))
+    gp = gn.GaussianProcess(gn.PlaneField([0, 0, 0], [0, 0, 1], 1), sigma, gn.SquaredExponential(0.1), bounds=bounds)
+    hits = gn.first_hits(gp, *rays(n, -3 * direction, direction), 10, sampler=sampler, seed=seed)
+    gradient = hits["gradient"][np.isfinite(hits["t"])]
+    assert len(gradient) > 0.999 * n
+    seen = np.sort(-gradient @ direction / np.linalg.norm(gradient, axis=1))
+    law = np.append(0, np.cumsum(visible_cosine(direction, sigma / 0.1, edges, np.random.default_rng(seed), False)))
+    steps, cdf = np.arange(len(seen) + 1) / len(seen), np.interp(seen, edges, law)
+    distance = max(np.max(steps[1:] - cdf), np.max(cdf - steps[:-1]))
+    figure(f"Oracle 12: isotropic, 45 degrees, alpha .5 by {sampler}: largest difference of the laws of n·ω {distance:.4f}")
+    assert 2 * np.exp(-2 * len(seen) * max(distance - 0.006, 0) ** 2) > SIGNIFICANCE, distance
 
 
 def test_ctrl_c_ends_a_long_search():

@@ -1,8 +1,8 @@
 """Sampler against sampler: two-sample tests of (t, gradient) at first hits and at the hits of rays reflected there, over
 every kernel x memory x anisotropy x mean and all samplers that serve the kernel (issue "the process, exact", must show 2).
 
-Each comparison has the significance of statistics_checks.py: all of them together (some 4,000 at full size) raise a false
-alarm with probability below 1e-3 (Bonferroni). Memory `global`: test_realisation_path.py, test_segment_memory.py.
+Each comparison has the significance of statistics_checks.py: all of them together (some 6,000 at full size) raise a false
+alarm with probability below 1e-3 (Bonferroni). More of memory `global`: test_realisation_path.py, test_segment_memory.py.
 """
 
 from dataclasses import dataclass
@@ -11,6 +11,7 @@ from functools import lru_cache
 import gpis_native as gn
 import numpy as np
 import pytest
+from remembered import take
 from statistics_checks import check_proportion, check_same_distribution
 from tensor_grids import along_x, isotropic, rotating
 
@@ -50,8 +51,9 @@ CASES = {
     ),
     "plane wave": lambda s, turned: Case(gn.PlaneWave([3, -4, 8] if turned else [1, 0, 7]), SMOOTH, joint=True),
     "sum": lambda s, turned: Case(0.5 * SE(**s) + 0.5 * gn.RationalQuadratic(1, 0.4), SMOOTH, joint=True),
-    "sum with a rough term": lambda s, turned: Case(
-        0.6 * SE(0.4) + 0.4 * gn.Matern(1.5, **s), ("dense", "realisation"), joint=True
+    "sum with a rough term": lambda s, turned: Case(0.6 * SE(0.4) + 0.4 * gn.Matern(1.5, **s), ROUGH, joint=True),
+    "sum of rough terms and a wave": lambda s, turned: Case(
+        0.4 * gn.Matern(1.5, **s) + 0.3 * gn.Matern(2.5, 0.25) + 0.3 * gn.PlaneWave([2, 1, -5]) * SE(**s), ROUGH, joint=True
     ),
     "product": lambda s, turned: Case(gn.RationalQuadratic(1, **s) * gn.PlaneWave([2, 1, -2]), SMOOTH, joint=True),
     # The long factor is 1 to 1e-8 within the bounds, but no sampler knows.
@@ -131,13 +133,16 @@ def quantities(hits, directions, start_gradient):
 
 
 def compare(a, b, directions, what, start_gradient=None):
-    """Hits on the same rays: the first len(b) rows of `directions` for b."""
+    """Hits on the same rays: the first len(b) rows of `directions` for b. Else pairs of directions and of gradients."""
     n, m = len(a["t"]), len(b["t"])
+    if not isinstance(directions, tuple):
+        directions = directions, directions[:m]
+        start_gradient = None if start_gradient is None else (start_gradient, start_gradient[:m])
     p = np.mean(np.isfinite(a["t"]))
     check_proportion(np.isfinite(b["t"]).sum(), m, p, np.sqrt(max(p * (1 - p), 1 / n) / n), f"{what}: hits")
     check_same_distribution(a["t"], b["t"], f"{what}: t")
-    start = [None if start_gradient is None else start_gradient[:k] for k in (n, m)]
-    of_a, of_b = quantities(a, directions[:n], start[0]), quantities(b, directions[:m], start[1])
+    start = start_gradient or (None, None)
+    of_a, of_b = (quantities(hits, *rest) for hits, *rest in zip((a, b), directions, start, strict=True))
     for key in of_a:
         check_same_distribution(of_a[key], of_b[key], f"{what}: {key}")
     assert min(len(of_a["slope"]), len(of_b["slope"])) > 20
@@ -187,3 +192,35 @@ def test_second_hits(name, shape, mean, memory, full_size, seed):
             continue
         hits = second(gp, sampler, min(n, len(origins)), seed + 500 + offset)
         compare(expected, hits, directions, f"{memory}, {sampler}", state["gradient"])
+
+
+def paths_of_two(gp, memory, sampler, n, seed):
+    """Camera rays and those that are reflected at their hits: both hits, both directions, the gradient between."""
+    origins, directions = camera_rays(n, seed)
+    first = gn.first_hits(gp, origins, directions, 10, memory=memory, sampler=sampler, seed=seed)
+    hit = np.isfinite(first["t"])
+    normal = first["gradient"][hit] / np.linalg.norm(first["gradient"][hit], axis=1, keepdims=True)
+    out = directions[hit] - 2 * np.sum(directions[hit] * normal, axis=1, keepdims=True) * normal
+    start = take(first["state"], hit)
+    second = gn.first_hits(gp, first["position"][hit], out, 10, memory=memory, start=start, sampler=sampler, seed=seed + 1)
+    return first, second, directions, out, start["gradient"]
+
+
+@over_all
+def test_paths_that_remember_whole_segments(name, shape, mean, full_size, seed):
+    """The second segment of a path knows all of the first under global-1, as it does where one realisation serves both
+    (global): one law, by samplers that share nothing. At full size the joint samplers against each other too."""
+    if not full_size and (shape, mean) != ("turned 4:1", "plane"):
+        return
+    case, pairs = processes(name, shape, mean)
+    gp, smooth = pairs[0][1], "nystrom" in case.samplers
+    n = 2000 if full_size else 250
+    paths = {"global": paths_of_two(gp, "global", "auto", n, seed)}
+    for k, sampler in enumerate(("nystrom", "dense") if smooth and full_size else ("auto",)):
+        paths[sampler] = paths_of_two(pairs[-1][1], "global-1", sampler, 2 * n, seed + 100 * (k + 1))
+    expected, *others = paths.items()
+    for what, of in others:
+        for segment in range(2):
+            directions = expected[1][2 + segment], of[2 + segment]
+            gradients = (expected[1][4], of[4]) if segment else None
+            compare(expected[1][segment], of[segment], directions, f"{what}, segment {segment}", gradients)

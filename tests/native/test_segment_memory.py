@@ -4,6 +4,7 @@ for the whole path (memory global) as n grows."""
 import gpis_native as gn
 import numpy as np
 import pytest
+from remembered import take
 from statistics_checks import check_same_distribution
 
 pytestmark = pytest.mark.stats
@@ -11,21 +12,6 @@ pytestmark = pytest.mark.stats
 BOX = ([-3, -3, -3], [3, 3, 3])
 ROUGH = gn.GaussianProcess(gn.SphereField((0, 0, 0), 1), 0.3, gn.SquaredExponential(0.4), bounds=BOX)
 MATERN = gn.GaussianProcess(gn.SphereField((0, 0, 0), 1), 0.3, gn.Matern(2.5, 0.5), bounds=BOX)
-
-
-def take(state, rows):
-    """The state of some rows of a first_hits result."""
-    out = {key: value[rows] for key, value in state.items() if key in ("value", "gradient")}
-    if "realisation" in state:
-        out["realisation"] = {key: value[rows] for key, value in state["realisation"].items()}
-    if "segments" in state:
-        kept = state["segments"]
-        number = np.full(len(state["value"]), -1)
-        number[rows] = np.arange(len(np.flatnonzero(rows) if rows.dtype == bool else rows))
-        chosen = number[kept["row"]] >= 0
-        out["segments"] = {key: value[chosen] for key, value in kept.items()}
-        out["segments"]["row"] = number[out["segments"]["row"]]
-    return out
 
 
 def bounce(gp, memory, hits, directions, seed):

@@ -66,3 +66,10 @@ def process_scene():
         }
 
     return describe
+
+
+@pytest.fixture(scope="module")
+def noisy(noisy_scene):
+    import gpis_native as gn
+
+    return gn.Scene(noisy_scene())
