@@ -42,7 +42,7 @@ def costly(kernel, sampler):
 
 
 def rough(kernel):
-    return kernel in ("matern 3/2", "wong", "sum with a rough term")
+    return kernel in ("matern 3/2", "wong", "sum with a rough term", "sum of rough terms")
 
 
 def absolute(kernel, sampler):

@@ -43,13 +43,26 @@ def rough_sum(q):
     return mpf("0.6") * se(q) + mpf("0.4") * matern32(q)
 
 
+def rough_terms(q):
+    return matern32(q) / 2 + mpf("0.3") * matern52(q / mpf("0.6")) + mpf("0.2") * wong(q / mpf("0.8"))
+
+
 KERNELS = {
     "squared exponential": se,
     "matern 3/2": matern32,
     "matern 5/2": matern52,
     "rational quadratic": rational_quadratic,
 }
-LINES = KERNELS | {"wong": wong, "locally periodic": locally_periodic, "sum with a rough term": rough_sum}
+LINES = KERNELS | {"wong": wong, "locally periodic": locally_periodic}
+LINES |= {"sum with a rough term": rough_sum, "sum of rough terms": rough_terms}
+# -κ''(0) where κ is not analytic at 0.
+CURVATURES = {
+    matern32: mpf(3),
+    matern52: mpf(5) / 3,
+    wong: mpf(1),
+    rough_sum: mpf("0.6") + mpf("0.4") * 3,
+    rough_terms: mpf(3) / 2 + mpf("0.3") * 5 / 3 / mpf("0.6") ** 2 + mpf("0.2") / mpf("0.8") ** 2,
+}
 
 
 @workdps(GRAM_DIGITS)
@@ -78,15 +91,7 @@ def posterior(kernel, spacing, count):
 def start(kernel, q):
     """Given g = 0, g' = 1 at the start; one-sided derivatives, the kernel's branch for q > 0 is analytic."""
     q = mpf(float(q))
-    curvature = -diff(kernel, mpf(0), 2, direction=1) if kernel not in (matern32, rough_sum) else None
-    if kernel is matern32:
-        curvature = mpf(3)
-    elif kernel is rough_sum:
-        curvature = mpf("0.6") + mpf("0.4") * 3
-    elif kernel is wong:
-        curvature = mpf(1)
-    elif kernel is matern52:
-        curvature = mpf(5) / 3
+    curvature = CURVATURES.get(kernel) or -diff(kernel, mpf(0), 2, direction=1)
     slope = diff(kernel, q)
     return {
         "mean": float(-slope / curvature),
