@@ -133,7 +133,7 @@ def test_shared_noise(operands, describe):
     a.gpis_csg.items.add().object = c
     a.gpis_csg.correlation = "SHARED"
     b.hide_render = c.hide_render = True
-    assert entry_of(describe)[0]["process"].plan()["composition"].endswith("shared by some leaves")
+    assert "noise shared by some leaves; leaves marched together" in entry_of(describe)[0]["process"].plan()["composition"]
     c.gpis.length_scale = 0.3
     with pytest.raises(
         ValueError, match='GPIS object "A": operand "C": union with shared_noise=True takes operands of one kernel'
