@@ -145,7 +145,7 @@ def _stamp(engine, session):
 
 def _beside_image(engine, scene, view_layer):
     """The image's path with .json for its extension; Blender numbers the frames of an animation only. None where the output
-    path names a folder and no file, as in every new scene: no picture that somebody keeps is called "/tmp/.png"."""
+    path names a folder and no file, as in every new scene: a picture whose name is an extension alone is kept by nobody."""
     render = scene.render
     if not engine.is_animation and (not render.filepath or render.filepath.endswith(("/", "\\"))):
         return None

@@ -1,6 +1,7 @@
 #include "integrator/path_tracer.h"
 
 #include "integrator/dielectric_scatter.h"
+#include "integrator/reach.h"
 #include "integrator/scatter.h"
 #include "process/realisation_memory.h"
 #include "process/segment_memory.h"
@@ -17,19 +18,6 @@ constexpr int kRouletteStart = 3;
 // The decisions of one vertex that low-discrepancy points make, in their order.
 constexpr int kGradientDecision = 0, kDirectionDecision = 1, kLightDecision = 2;
 constexpr int kVertexDecisions = kLightDecision + LightSet::kMostGroups;
-
-// Where rays may start: Embree would end the program on others. A medium without bounds goes on.
-constexpr double kReach = 2 * kFarthest;
-constexpr Box3 kWithinReach{{-kReach, -kReach, -kReach}, {kReach, kReach, kReach}};
-
-// The part of a ray within reach. From near the origin, where nearly all rays start, that is a
-// distance which all objects lie in.
-std::pair<double, double> within_reach(const Ray& ray, double t_max) {
-  const Vec3& o = ray.origin;
-  const double far = std::max({std::abs(o.x), std::abs(o.y), std::abs(o.z)});
-  if (far < 1e-3 * kFarthest) return {0, std::min(t_max, 0.99 * kReach)};
-  return clip(kWithinReach, o, ray.direction, 0, t_max);
-}
 
 // What a path knows of each stochastic surface at the point it leaves; nothing: a fresh start
 // outside of it.
@@ -113,9 +101,8 @@ struct PathTracer::Impl {
   int bounce = 0;
   Rng* rng = nullptr;
   // A stream of its own: light sampling never changes the path. Begun where a light is sampled.
-  Rng light_rng{0, 0};
+  std::optional<Rng> light_rng;
   std::uint64_t light_seed = 0;
-  bool light_begun = false;
   Counters* counters = nullptr;
 };
 
@@ -131,7 +118,7 @@ PathSample PathTracer::trace(const Ray& camera_ray, double t_max, const BlockPoi
   impl_->points = &points;
   impl_->rng = &rng;
   impl_->light_seed = rng();
-  impl_->light_begun = false;
+  impl_->light_rng.reset();
   impl_->counters = &counters;
   return impl_->trace(camera_ray, t_max);
 }
@@ -330,7 +317,7 @@ bool PathTracer::Impl::visible(const Ray& ray, double distance, int crossed) {
     if (enter > leave) continue;
     const bool from_inside = inside[b] != (static_cast<int>(b) == crossed);
     if (first_hit(body, from_inside, shadow_lines.data(), ray, distance, shadow_memory,
-                  shadow_realisations, light_rng)
+                  shadow_realisations, *light_rng)
             .t < distance)
       return false;
   }
@@ -343,10 +330,9 @@ template <class Scatter, class Remember>
 Color PathTracer::Impl::sample_lights(const Vertex& v, const Scatter& scatter,
                                       const Remember& remember) {
   Color sum;
-  if (!light_begun) light_rng = Rng(light_seed, 0);
-  light_begun = true;
+  if (!light_rng) light_rng.emplace(light_seed, 0);
   for (int group = 0; group < scene.lights.groups(); ++group) {
-    const SquarePoint at = point(kLightDecision + group, light_rng);
+    const SquarePoint at = point(kLightDecision + group, *light_rng);
     const std::optional<LightSample> light = scene.lights.sample(group, v.departure, at);
     if (!light) continue;
     const Color f = scatter.eval(light->direction);
