@@ -2,7 +2,7 @@
 //   set:     ln σ ← ln σ + a (ln v − ln σ)
 //   add:     ln σ ← ln σ + a ln v
 //   smooth:  ln σ ← ln σ + a (mean of ln σ over the six neighbours − ln σ)
-#include "field/paint_layers.h"
+#include "field/leaf_nodes.h"
 
 namespace gpis {
 
@@ -11,9 +11,9 @@ PaintCounts paint_deviation(const PaintLayers& layers, const Brush& brush, const
   const double log_value = brush.operation == Operation::smooth ? 0 : std::log(brush.value.x);
   const auto leaves = leaves_of_balls(layers, dab.centers.data(), dab.count, dab.radius);
   return rewrite<ScalarLayer>(layers, layers.sigma, leaves, [&] {
-    return [&, sigma = LayerReader<ScalarLayer>(layers.sigma.grid, layers.box)](
+    return [&, sigma = LeafNodes<ScalarLayer>(layers.sigma.grid, layers.box), logs = LeafNumbers()](
                const openvdb::Coord& c, const Vec3& x, double old,
-               PaintCounts& counts) -> std::optional<double> {
+               PaintCounts& counts) mutable -> std::optional<double> {
       const DabImages::Nearest near = dab.nearest(x);
       if (near.count == 0) return std::nullopt;
       const double a = dab.strength * brush.falloff(near.distance / dab.radius);
@@ -22,14 +22,8 @@ PaintCounts paint_deviation(const PaintLayers& layers, const Brush& brush, const
       double change = log_value;
       if (brush.operation == Operation::set) change = log_value - log_old;
       if (brush.operation == Operation::smooth) {
-        double sum = 0;
-        for (int axis = 0; axis < 3; ++axis)
-          for (int side : {-1, 1}) {
-            openvdb::Coord next = c;
-            next[axis] += side;
-            sum += log_of(sigma.at(next));
-          }
-        change = sum / 6 - log_old;
+        sigma.enter(c);
+        change = logs.mean_around(sigma, c, log_of) - log_old;
       }
       if (change == 0) return std::nullopt;
       const double value = std::exp(log_old + a * change);

@@ -6,7 +6,7 @@
 //             differences, for each image by itself
 //   grab:     μ(x) ← μ(x − a d),     d the direction; trilinear between nodes
 // Beyond the box stands the nearest node.
-#include "field/paint_layers.h"
+#include "field/leaf_nodes.h"
 
 namespace gpis {
 namespace {
@@ -29,7 +29,7 @@ Plane plane_under(const PaintLayers& layers, const Falloff& falloff, const Vec3&
   std::vector<Sum> sums(leaves.size());
   using Leaf = Layer<ScalarLayer>::Leaf;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size()), [&](const auto& some) {
-    const auto mean = layers.mean_reader();
+    LeafNodes<ScalarLayer> mean(layers.mean.grid, layers.box);
     for (std::size_t l = some.begin(); l < some.end(); ++l)
       for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
         const openvdb::Coord c = leaves[l] + Leaf::offsetToLocalCoord(n);
@@ -37,9 +37,10 @@ Plane plane_under(const PaintLayers& layers, const Falloff& falloff, const Vec3&
         const double distance = length(from_center);
         if (!layers.box.isInside(c) || distance >= radius) continue;
         const double w = falloff(distance / radius);
+        mean.enter(c);
         sums[l].weight += w;
         sums[l].value += w * mean.at(c);
-        sums[l].slope += layers.gradient_to_object * mean.difference(c) * w;
+        sums[l].slope += layers.gradient_to_object * difference(mean, layers.box, c) * w;
         sums[l].point += from_center * w;
       }
   });
@@ -64,8 +65,10 @@ PaintCounts paint_mean(const PaintLayers& layers, const Brush& brush, const DabI
 
   const auto leaves = leaves_of_balls(layers, dab.centers.data(), dab.count, dab.radius);
   return rewrite<ScalarLayer>(layers, layers.mean, leaves, [&] {
-    return [&, mean = layers.mean_reader()](const openvdb::Coord& c, const Vec3& x, double old,
-                                            PaintCounts&) -> std::optional<double> {
+    return [&, mean = layers.mean_reader(),
+            nodes = LeafNodes<ScalarLayer>(layers.mean.grid, layers.box)](
+               const openvdb::Coord& c, const Vec3& x, double old,
+               PaintCounts&) mutable -> std::optional<double> {
       const DabImages::Nearest near = dab.nearest(x);
       if (near.count == 0) return std::nullopt;
       const double a = dab.strength * brush.falloff(near.distance / dab.radius);
@@ -75,7 +78,8 @@ PaintCounts paint_mean(const PaintLayers& layers, const Brush& brush, const DabI
         case Operation::deflate:
           return old + a * brush.value.x * dab.radius;
         case Operation::smooth:
-          return old + a * (mean.around(c) - old);
+          nodes.enter(c);
+          return old + a * (around(nodes, c) - old);
         case Operation::flatten: {
           double sum = 0;
           for (int i = 0; i < near.count; ++i) sum += planes[near.image[i]].at(x);

@@ -9,35 +9,43 @@
 // differences, e₁ the direction without its part along e₃, normalised, and e₂ = e₃ × e₁. Convex
 // combinations keep A positive definite, and its condition within that of what is combined
 // (math.md §2). A node where ∇μ = 0, or e₃ is the direction to 1e-6, is left as it is.
-#include "field/paint_layers.h"
+#include "field/leaf_nodes.h"
 
 namespace gpis {
 namespace {
 
-double log_length(const SymMat3& a) {
-  return std::log(Cholesky3(a).determinant()) / 6;
+// By minors where they cancel few digits, as those of most brushes do; |a| is at most the product
+// of the diagonal (Hadamard), which their rounding is relative to.
+struct Minors {
+  double determinant, product;
+
+  explicit Minors(const SymMat3& a)
+      : determinant(a.xx * (a.yy * a.zz - a.yz * a.yz) - a.xy * (a.xy * a.zz - a.yz * a.xz) +
+                    a.xz * (a.xy * a.yz - a.yy * a.xz)),
+        product(a.xx * a.yy * a.zz) {}
+  bool are_precise() const { return determinant > 1e-3 * product; }
+};
+
+double determinant(const SymMat3& a) {
+  const Minors minors(a);
+  return minors.are_precise() ? minors.determinant : Cholesky3(a).determinant();
 }
 
-// ln ℓ of the nodes of one leaf and those beside it, each computed once.
-class LogLengths {
- public:
-  double at(const openvdb::Coord& leaf, const openvdb::Coord& c,
-            const LayerReader<TensorLayer>& tensor) {
-    if (!(leaf == leaf_)) {
-      leaf_ = leaf;
-      known_.fill(std::nan(""));
-    }
-    const openvdb::Coord i = c - leaf;
-    double& value = known_[((i.x() + 1) * kSide + i.y() + 1) * kSide + i.z() + 1];
-    if (std::isnan(value)) value = log_length(tensor.at(c));
-    return value;
-  }
+bool is_positive(const SymMat3& a) {
+  const Minors minors(a);
+  const double corner = a.xx * a.yy - a.xy * a.xy;
+  const bool surely = a.xx > 0 && corner > 1e-3 * a.xx * a.yy && minors.are_precise();
+  return surely || Cholesky3(a).positive;
+}
 
- private:
-  static constexpr int kSide = 10;
-  openvdb::Coord leaf_ = openvdb::Coord::max();
-  std::array<double, kSide * kSide * kSide> known_;
-};
+// v vᵀ
+SymMat3 square(const Vec3& v) {
+  return {v.x * v.x, v.y * v.y, v.z * v.z, v.x * v.y, v.x * v.z, v.y * v.z};
+}
+
+double log_length(const SymMat3& a) {
+  return std::log(determinant(a)) / 6;
+}
 
 class TensorDab {
  public:
@@ -46,7 +54,8 @@ class TensorDab {
         brush_(brush),
         dab_(dab),
         tensor_(layers.anisotropy.grid, layers.box),
-        mean_(layers.mean_reader()) {
+        mean_(layers.mean.grid, layers.box) {
+    for (int i = 0; i < dab.count; ++i) tangents_[i] = normalize(dab.directions[i]);
     const Vec3 q = brush.ratios;
     const double scale = std::pow(q.x * q.y * q.z, -2.0 / 3);
     for (int i = 0; i < 3; ++i) squares_[i] = q[i] * q[i] * scale;
@@ -58,14 +67,18 @@ class TensorDab {
     if (near.count == 0) return std::nullopt;
     const double a = dab_.strength * brush_.falloff(near.distance / dab_.radius);
     if (a == 0) return std::nullopt;
-    std::optional<SymMat3> out;
-    if (brush_.channel == Channel::length_scale)
-      out = resized(c, old, a, counts);
-    else if (brush_.operation == Operation::smooth)
-      out = old * (1 - a) + tensor_.around(c) * a;
-    else
-      out = combed(c, old, a, near, counts);
-    if (out && !Cholesky3(TensorLayer::load(TensorLayer::store(*out))).positive) {
+    // Functions that say whether there is a new value: an optional of 48 bytes takes longer to hand
+    // on.
+    SymMat3 out;
+    if (brush_.channel == Channel::length_scale) {
+      if (!resized(c, old, a, counts, out)) return std::nullopt;
+    } else if (brush_.operation == Operation::smooth) {
+      tensor_.enter(c);
+      out = old * (1 - a) + around(tensor_, c) * a;
+    } else if (!combed(c, old, a, near, counts, out)) {
+      return std::nullopt;
+    }
+    if (!is_positive(TensorLayer::load(TensorLayer::store(out)))) {
       ++counts.rejected;
       return std::nullopt;
     }
@@ -73,64 +86,65 @@ class TensorDab {
   }
 
  private:
-  std::optional<SymMat3> resized(const openvdb::Coord& c, const SymMat3& old, double a,
-                                 PaintCounts& counts) {
+  bool resized(const openvdb::Coord& c, const SymMat3& old, double a, PaintCounts& counts,
+               SymMat3& out) {
     const bool smooth = brush_.operation == Operation::smooth;
-    const openvdb::Coord leaf = c & ~7;
-    const double log_old = smooth ? log_lengths_.at(leaf, c, tensor_) : log_length(old);
-    double change = 0;
+    double log_old, change;
     if (smooth) {
-      double sum = 0;
-      for (int axis = 0; axis < 3; ++axis)
-        for (int side : {-1, 1}) {
-          openvdb::Coord next = c;
-          next[axis] += side;
-          sum += log_lengths_.at(leaf, next, tensor_);
-        }
-      change = sum / 6 - log_old;
+      tensor_.enter(c);
+      log_old = log_lengths_.at(tensor_, c, log_length);
+      change = log_lengths_.mean_around(tensor_, c, log_length) - log_old;
     } else {
+      log_old = log_length(old);
       change = std::log(brush_.value.x);
       if (brush_.operation == Operation::set) change -= log_old;
     }
-    if (change == 0) return std::nullopt;
+    if (change == 0) return false;
     const double log_new = log_old + a * change;
     const double kept = std::clamp(log_new, std::log(kLeastLength), std::log(kMostLength));
     counts.clamped += kept != log_new;
-    return old * std::exp(2 * (kept - log_old));
+    out = old * std::exp(2 * (kept - log_old));
+    return true;
   }
 
-  std::optional<SymMat3> combed(const openvdb::Coord& c, const SymMat3& old, double a,
-                                const DabImages::Nearest& near, PaintCounts& counts) const {
-    const Vec3 slope = layers_.gradient_to_object * mean_.difference(c);
-    const double steepness = length(slope);
+  // e₁e₁ᵀ and e₃e₃ᵀ need no square root, and e₂e₂ᵀ = I − e₁e₁ᵀ − e₃e₃ᵀ.
+  bool combed(const openvdb::Coord& c, const SymMat3& old, double a, const DabImages::Nearest& near,
+              PaintCounts& counts, SymMat3& out) {
+    mean_.enter(c);
+    const Vec3 slope = layers_.gradient_to_object * difference(mean_, layers_.box, c);
+    const double steepness = dot(slope, slope);
     if (!(steepness > 0)) {
       ++counts.undirected;
-      return std::nullopt;
+      return false;
     }
-    const Vec3 e3 = slope / steepness;
-    SymMat3 goal;
+    SymMat3 along;
     for (int i = 0; i < near.count; ++i) {
-      const Vec3 tangent = normalize(dab_.directions[near.image[i]]);
-      const Vec3 across = tangent - e3 * dot(tangent, e3);
-      if (!(length(across) > 1e-6)) {
+      const Vec3& tangent = tangents_[near.image[i]];
+      const Vec3 across = tangent - slope * (dot(tangent, slope) / steepness);
+      const double sine = dot(across, across);
+      if (!(sine > 1e-12)) {
         ++counts.undirected;
-        return std::nullopt;
+        return false;
       }
-      const Vec3 e1 = normalize(across), e2 = cross(e3, e1);
-      goal = goal + SymMat3::of(outer(e1, e1) * squares_[0] + outer(e2, e2) * squares_[1] +
-                                outer(e3, e3) * squares_[2]);
+      along = along + square(across) * (1 / sine);
     }
-    const double determinant = Cholesky3(old).determinant(), size = std::cbrt(determinant);
-    const SymMat3 mixed = old * (1 - a) + goal * (a * size / near.count);
-    return mixed * std::cbrt(determinant / Cholesky3(mixed).determinant());
+    const SymMat3 goal = SymMat3::identity(squares_[1]) +
+                         along * ((squares_[0] - squares_[1]) / near.count) +
+                         square(slope) * ((squares_[2] - squares_[1]) / steepness);
+    // In logarithms, which take less time than cube roots.
+    const double log_size = std::log(determinant(old)) / 3;
+    const SymMat3 mixed = old * (1 - a) + goal * (a * std::exp(log_size));
+    out = mixed * std::exp(log_size - std::log(determinant(mixed)) / 3);
+    return true;
   }
 
   const PaintLayers& layers_;
   const Brush& brush_;
   const DabImages& dab_;
-  LayerReader<TensorLayer> tensor_;
-  LayerReader<ScalarLayer> mean_;
-  LogLengths log_lengths_;
+  LeafNodes<TensorLayer> tensor_;
+  LeafNodes<ScalarLayer> mean_;
+  LeafNumbers log_lengths_;
+  std::array<Vec3, DabImages::kMost> tangents_;
   Vec3 squares_;
 };
 

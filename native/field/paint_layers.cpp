@@ -1,23 +1,17 @@
-#include "field/paint_layers.h"
-
 #include <algorithm>
+
+#include "field/leaf_nodes.h"
 
 namespace gpis {
 namespace {
-
-constexpr int kLeaf = 8;
-
-openvdb::Coord leaf_of(const openvdb::Coord& c) {
-  return c & ~(kLeaf - 1);
-}
 
 template <class Visit>
 void visit_leaves(const openvdb::CoordBBox& box, const Visit& visit) {
   if (box.empty()) return;
   const openvdb::Coord first = leaf_of(box.min()), last = leaf_of(box.max());
-  for (int i = first.x(); i <= last.x(); i += kLeaf)
-    for (int j = first.y(); j <= last.y(); j += kLeaf)
-      for (int k = first.z(); k <= last.z(); k += kLeaf) visit(openvdb::Coord(i, j, k));
+  for (int i = first.x(); i <= last.x(); i += kLeafSide)
+    for (int j = first.y(); j <= last.y(); j += kLeafSide)
+      for (int k = first.z(); k <= last.z(); k += kLeafSide) visit(openvdb::Coord(i, j, k));
 }
 
 template <class Kind>
@@ -58,7 +52,7 @@ std::vector<openvdb::Coord> leaves_of_balls(const PaintLayers& layers, const Vec
   // From the middle of a leaf to its furthest corner.
   const double reach =
       radius +
-      (kLeaf - 1) / 2.0 * (length(axes.row[0]) + length(axes.row[1]) + length(axes.row[2]));
+      (kLeafSide - 1) / 2.0 * (length(axes.row[0]) + length(axes.row[1]) + length(axes.row[2]));
   std::vector<openvdb::Coord> out;
   for (int image = 0; image < count; ++image) {
     const Vec3 middle = layers.to_index.point(centers[image]);

@@ -58,6 +58,16 @@ struct Layer {
   std::array<typename Grid::Ptr, Kind::K> grid, base;  // none: not painted, and not in the file
 
   explicit operator bool() const { return grid[0] != nullptr; }
+  // All values of the leaf at a place, whether it is there or not.
+  void read_leaf(const openvdb::Coord& at,
+                 std::array<typename Kind::Stored, Leaf::SIZE>& values) const {
+    for (int k = 0; k < Kind::K; ++k) {
+      const Leaf* leaf = grid[k]->constTree().probeConstLeaf(at);
+      const auto* stored = leaf ? leaf->buffer().data() : nullptr;
+      const auto constant = leaf ? typename Grid::ValueType(0) : grid[k]->constTree().getValue(at);
+      for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) values[n][k] = stored ? stored[n] : constant;
+    }
+  }
   // The leaves of a place to be written to, which are made if they are not there. The first time
   // they are painted on they are copied aside; what extends a grid is part of what it was.
   struct Touched {
@@ -100,13 +110,6 @@ class LayerReader {
     return s;
   }
   Value at(const openvdb::Coord& c) const { return Kind::load(stored(clamped(c, box_))); }
-  // The mean of the six neighbours.
-  Value around(const openvdb::Coord& c) const {
-    Value sum = at(c.offsetBy(-1, 0, 0)) + at(c.offsetBy(1, 0, 0));
-    sum = sum + at(c.offsetBy(0, -1, 0)) + at(c.offsetBy(0, 1, 0));
-    sum = sum + at(c.offsetBy(0, 0, -1)) + at(c.offsetBy(0, 0, 1));
-    return sum * (1.0 / 6);
-  }
   // Trilinear between nodes; `x` in index space.
   Value sample(const Vec3& x) const {
     int cell[3];
@@ -125,17 +128,6 @@ class LayerReader {
     }
     return sum;
   }
-  // Central differences in index space, one-sided at the sides of the box. Scalars only.
-  Vec3 difference(const openvdb::Coord& c) const {
-    Vec3 out;
-    for (int i = 0; i < 3; ++i) {
-      openvdb::Coord low = c, high = c;
-      low[i] = std::max(c[i] - 1, box_.min()[i]);
-      high[i] = std::min(c[i] + 1, box_.max()[i]);
-      if (low[i] < high[i]) out[i] = (at(high) - at(low)) / (high[i] - low[i]);
-    }
-    return out;
-  }
 
  private:
   // Not registered with the tree: it does not change while one of these lives.
@@ -143,6 +135,29 @@ class LayerReader {
   std::array<std::optional<Voxels>, Kind::K> voxels_;
   openvdb::CoordBBox box_;
 };
+
+// The mean of the six neighbours; `nodes` is one of the readers of nodes.
+template <class Nodes>
+typename Nodes::Value around(const Nodes& nodes, const openvdb::Coord& c) {
+  auto sum = nodes.at(c.offsetBy(-1, 0, 0)) + nodes.at(c.offsetBy(1, 0, 0));
+  sum = sum + nodes.at(c.offsetBy(0, -1, 0)) + nodes.at(c.offsetBy(0, 1, 0));
+  sum = sum + nodes.at(c.offsetBy(0, 0, -1)) + nodes.at(c.offsetBy(0, 0, 1));
+  return sum * (1.0 / 6);
+}
+// Central differences of a scalar in index space, one-sided at the sides of the box.
+template <class Nodes>
+Vec3 difference(const Nodes& nodes, const openvdb::CoordBBox& box, const openvdb::Coord& c) {
+  Vec3 out;
+  for (int i = 0; i < 3; ++i) {
+    openvdb::Coord low = c, high = c;
+    low[i] = std::max(c[i] - 1, box.min()[i]);
+    high[i] = std::min(c[i] + 1, box.max()[i]);
+    if (low[i] == high[i]) continue;
+    const double change = nodes.at(high) - nodes.at(low);
+    out[i] = high[i] - low[i] == 2 ? change / 2 : change;
+  }
+  return out;
+}
 
 inline constexpr const char* kPaintedGrids[4] = {"sigma", "anisotropy_diagonal",
                                                  "anisotropy_offdiagonal", "albedo"};
@@ -200,21 +215,22 @@ PaintCounts rewrite(const PaintLayers& layers, const Layer<Kind>& layer,
   const tbb::blocked_range<std::size_t> all(0, leaves.size());
   tbb::parallel_for(all, [&](const tbb::blocked_range<std::size_t>& some) {
     auto worker = make_worker();
-    const LayerReader<Kind> read(layer.grid, layers.box);
-    for (std::size_t l = some.begin(); l < some.end(); ++l)
+    std::array<Stored, Leaf::SIZE> old;
+    for (std::size_t l = some.begin(); l < some.end(); ++l) {
+      layer.read_leaf(leaves[l], old);
       for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
         const openvdb::Coord c = leaves[l] + Leaf::offsetToLocalCoord(n);
         if (!layers.box.isInside(c)) continue;
-        const Stored old = read.stored(c);
-        const auto value = worker(c, layers.point(c), Kind::load(old), counts[l]);
+        const auto value = worker(c, layers.point(c), Kind::load(old[n]), counts[l]);
         if (!value) continue;
         const Stored stored = Kind::store(*value);
-        if (stored == old) continue;
-        if (!changes[l]) changes[l] = std::make_unique<Change>();
+        if (stored == old[n]) continue;
+        if (!changes[l]) changes[l].reset(new Change);  // its values are not cleared
         changes[l]->nodes.set(n);
         changes[l]->values[n] = stored;
         ++counts[l].nodes;
       }
+    }
   });
   std::vector<typename Layer<Kind>::Touched> written(leaves.size());
   PaintCounts sum;

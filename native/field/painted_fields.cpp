@@ -128,8 +128,8 @@ void PaintedFields::extend(const Box3& bounds) {
             const auto value = read.at(nearest);
             if constexpr (std::is_same_v<Kind, ScalarLayer>) {
               if (&layer == &larger.mean) {
-                const double rise =
-                    dot(old.gradient_to_object * read.difference(nearest), x - old.point(nearest));
+                const double rise = dot(old.gradient_to_object * difference(read, old.box, nearest),
+                                        x - old.point(nearest));
                 // Outside stays outside.
                 return value + (value > 0 ? std::max(rise, 0.0) : rise);
               }
