@@ -4,8 +4,8 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty
 
-from ..viewport import colour, overlay
-from . import bake, conditions, hover, settings, stroke
+from ..viewport import channels, colour, overlay
+from . import bake, conditions, eyedropper, hover, settings, stroke
 
 # The stroke in the making, None most of the time; what the header says of the place under the mouse.
 _active = None
@@ -46,22 +46,22 @@ def read(context, said):
             region.tag_redraw()
 
 
-def value_text(scene, brush, fields, location):
-    """The channel's value at a place in object space, with its unit."""
+def value_text(scene, brush, fields, location, radius):
+    """The channel's value at a place in object space, with its unit. The mean is 0 all over its surface: of it, what
+    a dab of this radius moves, or reaches."""
+    if brush.channel == "MEAN":
+        if brush.value_name:
+            return f"{colour.length(scene, brush.strength * brush.displacement * radius)} a dab"
+        return f"radius {colour.length(scene, radius)}"
     if brush.channel in {"DEVIATION", "LENGTH_SCALE"}:
         value = fields.values(brush.channel.lower(), [location])[0]
         return f"{'σ' if brush.channel == 'DEVIATION' else 'ℓ'} {colour.length(scene, value)}"
     if brush.channel == "ANISOTROPY":
-        squares = np.linalg.eigvalsh(_matrix(fields.values("anisotropy", [location])[0]))
+        squares = np.linalg.eigvalsh(channels.matrices(fields.values("anisotropy", [location])))[0]
         return " : ".join(f"{length:.3g}" for length in np.sqrt(squares[::-1] / squares[0]))
     if brush.channel == "ALBEDO":
         return "albedo " + ", ".join(f"{part:.2f}" for part in fields.values("albedo", [location])[0])
     return ""
-
-
-def _matrix(entries):
-    xx, yy, zz, xy, xz, yz = entries
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def view_of(context):
@@ -128,8 +128,9 @@ class GPIS_OT_paint(_InView, bpy.types.Operator):
         self._depth = found.world
         painted = stroke.Brush(**brush.brush(obj, self.mode))
         self._drag = painted.operation == "grab"
+        self._radius = hover.radius_of(brush, found)
         self._spacing = stroke.Spacing(
-            hover.radius_of(brush, found),
+            self._radius,
             brush.strength,
             brush.spacing / 100,
             pressure_radius=brush.use_pressure_radius,
@@ -155,7 +156,7 @@ class GPIS_OT_paint(_InView, bpy.types.Operator):
         self._painting.add(self._spacing.add(location, _pressure(event)))
         overlay.painting(obj, self.fields)
         brush = context.scene.gpis.paint
-        said = value_text(context.scene, brush, self.fields, location)
+        said = value_text(context.scene, brush, self.fields, location, self._radius)
         context.area.header_text_set(f"{self._painting.stroke.brush.operation.title()}   {said}   {_KEYS}")
 
     def modal(self, context, event):
@@ -224,23 +225,14 @@ class GPIS_OT_paint_sample(_InView, bpy.types.Operator):
         try:
             bake.check(obj)
             fields = bake.fields(obj)
+            found = under_mouse(context, event, obj, fields)
+            if found is None:
+                raise ValueError(f"{bake.owner_of(obj)}: its mean surface is not under the mouse.")
+            said = eyedropper.take(context.scene, obj, brush, fields, found)
         except ValueError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        found = under_mouse(context, event, obj, fields)
-        if found is None:
-            return {"CANCELLED"}
-        if brush.channel == "ALBEDO":
-            brush.color = fields.values("albedo", [found.location])[0]
-        elif brush.channel == "ANISOTROPY":
-            squares = np.linalg.eigvalsh(_matrix(fields.values("anisotropy", [found.location])[0]))
-            brush.ratios = np.sqrt(squares[::-1] / squares[0])
-        elif brush.channel in {"DEVIATION", "LENGTH_SCALE"}:
-            value = fields.values(brush.channel.lower(), [found.location])[0]
-            setattr(brush, "sigma" if brush.channel == "DEVIATION" else "length_scale", value)
-        else:
-            return {"CANCELLED"}
-        self.report({"INFO"}, f"Brush: {value_text(context.scene, brush, fields, found.location)}")
+        self.report({"INFO"}, f"Brush: {said}")
         return {"FINISHED"}
 
 

@@ -245,7 +245,11 @@ class GPIS_PaintProperties(bpy.types.PropertyGroup):
     show_shells: BoolProperty(
         name="Shells at ±σ", description="Show the surfaces one standard deviation outside and inside", default=False
     )
-    show_axes: BoolProperty(name="Long Axes", description="Lines along the longest direction of the bumps", default=True)
+    show_axes: BoolProperty(
+        name="Ellipses",
+        description="Sections of the bumps through their two longest directions, where they are longer in one than in another",
+        default=True,
+    )
 
     @property
     def operation_name(self):

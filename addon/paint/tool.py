@@ -147,7 +147,7 @@ def _draw_ring(context, xy):
     radius = hover.radius_of(brush, found)
     points = hover.projected(region, region_data, hover.ring(found, radius)) + corner
     draw.lines(points, _RING_SMOOTH if modal.smoothing() else _RING, width=2.0, depth=False, kind="LINE_STRIP")
-    said = modal.value_text(context.scene, brush, fields, found.location)
+    said = modal.value_text(context.scene, brush, fields, found.location, radius)
     modal.read(context, said)
     if said:
         scale = context.preferences.system.ui_scale

@@ -1,4 +1,4 @@
-"""What the overlay shows of a channel: colours on the mean surface with a legend, and lines along the long axes."""
+"""What the overlay shows of a channel: colours on the mean surface with a legend, and ellipses of the bumps."""
 
 from dataclasses import dataclass
 
@@ -6,8 +6,8 @@ import numpy as np
 
 from . import colour
 
-# Lines along the long axes of the bumps, over the whole surface.
-_LINES = 1500
+# Ellipses of the bumps, over the whole surface; sides of one.
+_ELLIPSES, _SIDES = 1500, 12
 
 
 @dataclass
@@ -67,18 +67,26 @@ def ratio(entries):
     return np.sqrt(squares[:, 2] / np.maximum(squares[:, 0], 1e-300))
 
 
-def axes(fields, surface):
-    """Ends (2 N, 3) of lines along the longest length scale, on a part of the vertices."""
+def ellipses(fields, surface):
+    """Ends (2 N, 3) of lines around sections of the bumps, each through its two longest directions, on a part of the
+    vertices: combed bumps are needles, discs are round."""
     vertices, normals = surface.vertices, surface.normals
-    chosen = np.random.default_rng(0).permutation(len(vertices))[:_LINES]
-    squares, vectors = np.linalg.eigh(matrices(fields.values("anisotropy", vertices[chosen])))
-    length = float(np.linalg.norm(surface.high - surface.low)) / 60
-    # None where it is as long in every direction: an arbitrary axis would look like a painted one.
-    strength = np.clip(np.sqrt(squares[:, 2] / squares[:, 1]) - 1, 0, 1)[:, None]
-    half = 0.5 * length * strength * vectors[:, :, 2]
-    lifted = vertices[chosen] + 0.1 * length * normals[chosen]
-    ends = np.stack([lifted - half, lifted + half], axis=1)
-    return ends[strength[:, 0] > 0.02].reshape(-1, 3)
+    chosen = np.random.default_rng(0).permutation(len(vertices))[:_ELLIPSES]
+    a = matrices(fields.values("anisotropy", vertices[chosen]))
+    normal = normals[chosen]
+    # Where two lengths are nearly alike either direction is right, and that in the surface is seen best.
+    least = 0.01 * np.trace(a, axis1=1, axis2=2)[:, None, None]
+    squares, vectors = np.linalg.eigh(a - least * normal[:, :, None] * normal[:, None, :])
+    lengths = np.sqrt(np.maximum(squares, 0))
+    # None where it is as long in every direction: arbitrary axes would look like painted ones.
+    strength = np.clip(lengths[:, 2] / np.maximum(lengths[:, 0], 1e-300) - 1, 0, 1)
+    strength[strength < 0.05] = 0
+    half = float(np.linalg.norm(surface.high - surface.low)) / 100 * strength / lengths[:, 2]
+    first, second = (vectors[:, :, i] * (half * lengths[:, i])[:, None] for i in (2, 1))
+    lifted = vertices[chosen] + 0.1 * np.linalg.norm(first, axis=1, keepdims=True) * normal
+    angle = np.linspace(0, 2 * np.pi, _SIDES + 1)[:, None, None]
+    around = (lifted + np.cos(angle) * first + np.sin(angle) * second)[:, strength > 0]
+    return np.stack([around[:-1], around[1:]], axis=2).transpose(1, 0, 2, 3).reshape(-1, 3)
 
 
 def moved(fields, surface):

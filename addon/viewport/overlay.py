@@ -10,7 +10,7 @@ from .areas import tag_redraw
 GREY = (0.72, 0.72, 0.72)
 _SHELLS = ((1.0, (0.35, 0.65, 1.0)), (-1.0, (1.0, 0.55, 0.25)))
 _SHELL_OPACITY = 0.22
-_STROKES = (0.05, 0.05, 0.05, 0.9)
+_ELLIPSES = (0.05, 0.05, 0.05, 0.9)
 _PINS = (1.0, 0.35, 0.1, 1.0)
 
 # The stroke that is being painted: (name of the object, its live fields), or None; and how often it went on.
@@ -28,7 +28,7 @@ class _Drawn:
         self.key = key
         self.batch = None
         self.shells = []
-        self.axes = np.empty((0, 3))
+        self.ellipses = np.empty((0, 3))
         self.pins = np.empty((0, 3))
         self.legend = None
 
@@ -76,7 +76,7 @@ def _draw_view():
         drawn = _refreshed(context, obj, found)
         matrix = obj.matrix_world.copy()
         draw.surface(drawn.batch, matrix, region_data)
-        draw.lines(drawn.axes, _STROKES, matrix, width=1.6)
+        draw.lines(drawn.ellipses, _ELLIPSES, matrix, width=1.4)
         draw.lines(drawn.pins, _PINS, matrix, width=4.0)
         for batch in drawn.shells:
             draw.surface(batch, matrix, region_data, _SHELL_OPACITY)
@@ -125,7 +125,7 @@ def _refreshed(context, obj, found):
             colours = colours if view.colours is None else view.colours
             drawn.legend = view.legend
         if brush.show_axes and brush.channel == "ANISOTROPY":
-            drawn.axes = channels.axes(fields, found)
+            drawn.ellipses = channels.ellipses(fields, found)
         if brush.channel == "CONDITION":
             drawn.pins = channels.pins(settings.conditions, found)
         if brush.show_shells:

@@ -136,10 +136,125 @@ def test_what_the_overlay_shows(module, sphere, brush):
     painting = bake.Painting(sphere, stroke.Brush(**brush.brush(sphere)))
     painting.add(stroke.Dabs([(0, 0, 1)], [0.6], [1.0], [(1, 0, 0)]))
     painting.finish()
-    lines = channels.axes(bake.fields(sphere), surface).reshape(-1, 2, 3)
-    assert len(lines) and np.all(lines[:, :, 2] > 0.7), "only where it is combed"
-    along = np.abs((lines[:, 1] - lines[:, 0]) / np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1, keepdims=True))
-    assert np.median(along[:, 0]) > 0.95
+    drawn = ellipses(module, sphere)
+    assert len(drawn) and np.all(drawn[:, :, 2] > 0.7), "only where it is combed"
+    assert np.median(extents(drawn)[:, 0] / extents(drawn)[:, 1]) == pytest.approx(6, rel=0.1)
+
+
+def ellipses(module, obj):
+    """Corners of what the overlay draws: (ellipses, sides, 3)."""
+    bake, channels = module("paint.bake"), module("viewport.channels")
+    lines = channels.ellipses(bake.fields(obj), module("viewport.surface").of(obj)).reshape(-1, channels._SIDES, 2, 3)
+    assert np.allclose(lines[:, :, 1], np.roll(lines[:, :, 0], -1, axis=1)), "closed"
+    return lines[:, :, 0]
+
+
+def extents(corners):
+    return np.ptp(corners, axis=1)
+
+
+@pytest.mark.parametrize(
+    ("lengths", "seen"),
+    # At the top of the sphere, combed along x: in x, y and z, against the longest of them.
+    [((6, 1, 1), (1, 1 / 6, 0)), ((1, 6, 1), (1 / 6, 1, 0)), ((6, 6, 1), (1, 1, 0)), ((1, 1, 6), (1 / 6, 1 / 6, 1)), ((6, 1, 6), (1, 0, 1))],
+)
+def test_every_anisotropy_is_seen(module, sphere, brush, lengths, seen):
+    """Needles, discs and bumps that stand on the surface; without one nothing is drawn."""
+    assert len(ellipses(module, sphere)) == 0
+    comb(module, sphere, lengths)
+    drawn = ellipses(module, sphere)
+    top = drawn[np.linalg.norm(drawn.mean(axis=1)[:, :2], axis=1) < 0.1]
+    assert len(top) > 1
+    size = extents(top) / extents(top).max(axis=1, keepdims=True)
+    if lengths == (1, 1, 6):  # the second axis is any in the surface
+        size[:, 0] = size[:, 1] = np.linalg.norm(size[:, :2], axis=1)
+    assert np.median(size, axis=0) == pytest.approx(seen, abs=0.1)
+
+
+def comb(module, obj, lengths, direction=(1, 0, 0), symmetry=(False, False, False)):
+    bake, stroke = module("paint.bake"), module("paint.stroke")
+    brush = stroke.Brush("anisotropy", "comb", ratios=lengths, falloff="constant", symmetry=symmetry)
+    painting = bake.Painting(obj, brush)
+    painting.add(stroke.Dabs([(0, 0, 1)], [0.6], [1.0], [direction]))
+    painting.finish()
+
+
+def take(module, obj, location=(0, 0, 1)):
+    """What the eyedropper says it took at a place of the unit sphere."""
+    bake, hover = module("paint.bake"), module("paint.hover")
+    place = np.array(location, dtype=float)
+    found = hover.Hover(place, place, Vector(location), Vector(location), 0.01, 1.0)
+    scene = bpy.context.scene
+    return module("paint.eyedropper").take(scene, obj, scene.gpis.paint, bake.fields(obj), found)
+
+
+@pytest.mark.parametrize("lengths", [(6, 1, 1), (1, 6, 1), (1, 1, 6), (2, 4, 1), (1, 4, 2), (6, 6, 1)])
+@pytest.mark.parametrize("direction", [(1, 0, 0), (0.6, -0.8, 0)])
+def test_the_eyedropper_takes_what_was_combed_with(module, sphere, brush, lengths, direction):
+    """Along the stroke, across it and along the normal stay what they are, however long."""
+    brush.channel = "ANISOTROPY"
+    comb(module, sphere, lengths, direction)
+    said = take(module, sphere)
+    # Nodes about the place were combed in their own planes: over a voxel the normal turns by .08.
+    assert tuple(brush.ratios) == pytest.approx(lengths, rel=0.06)
+    assert said.endswith("(along, across, normal)")
+
+
+def test_the_eyedropper_of_mirrored_and_unknown_strokes(module, sphere, brush):
+    brush.channel = "ANISOTROPY"
+    bake, stroke = module("paint.bake"), module("paint.stroke")
+    mirrored = stroke.Brush("anisotropy", "comb", ratios=(1, 5, 2), falloff="constant", symmetry=(True, False, False))
+    painting = bake.Painting(sphere, mirrored)
+    painting.add(stroke.Dabs([(0.8, 0, 0.6)], [0.5], [1.0], [(0.48, 0.6, -0.64)]))
+    painting.finish()
+    for side in (1, -1):
+        brush.ratios = (1, 1, 1)
+        take(module, sphere, (0.8 * side, 0, 0.6))
+        assert tuple(brush.ratios) == pytest.approx((1, 5, 2), rel=0.05), side
+    # The strokes are gone: the longer one in the surface is along.
+    sphere.data.gpis_strokes = ""
+    take(module, sphere, (0.8, 0, 0.6))
+    assert tuple(brush.ratios) == pytest.approx((5, 1, 2), rel=0.05)
+
+
+def test_the_eyedropper_takes_values(module, sphere, brush):
+    bake, stroke = module("paint.bake"), module("paint.stroke")
+    for channel, value, name in (
+        ("DEVIATION", 0.25, "sigma"),
+        ("LENGTH_SCALE", 0.5, "length_scale"),
+        ("ALBEDO", (0.2, 0.4, 0.6), "color"),
+    ):
+        painting = bake.Painting(sphere, stroke.Brush(channel.lower(), "set", value=value, falloff="constant"))
+        painting.add(stroke.Dabs([(0, 0, 1)], [0.5], [1.0], [(0, 0, 0)]))
+        painting.finish()
+        brush.channel = channel
+        said = take(module, sphere)
+        got = getattr(brush, name)
+        assert (tuple(got) if channel == "ALBEDO" else got) == pytest.approx(value, rel=1e-4)
+        assert said == {"DEVIATION": "σ 25 cm", "LENGTH_SCALE": "ℓ 50 cm", "ALBEDO": "albedo 0.20, 0.40, 0.60"}[channel]
+    for channel, sentence in (("MEAN", "The mean has no value to take"), ("CONDITION", "Condition points have no value")):
+        brush.channel = channel
+        with pytest.raises(ValueError, match=sentence):
+            take(module, sphere)
+
+
+def test_what_the_header_says_of_the_place_under_the_mouse(module, sphere, brush):
+    said = module("paint.modal").value_text
+    fields = module("paint.bake").fields(sphere)
+
+    def of(channel):
+        brush.channel = channel
+        return said(bpy.context.scene, brush, fields, (0, 0, 1), 0.2)
+
+    sphere.gpis.sigma = 0.05
+    fields = module("paint.bake").fields(sphere)
+    brush.strength, brush.displacement = 0.5, 0.05
+    assert of("MEAN") == "5 mm a dab"
+    brush.mean_operation = "SMOOTH"
+    assert of("MEAN") == "radius 20 cm"
+    assert of("DEVIATION") == "σ 5 cm"
+    assert of("LENGTH_SCALE").startswith("ℓ ") and of("ANISOTROPY") == "1 : 1 : 1"
+    assert of("ALBEDO") == "albedo 1.00, 1.00, 1.00"
 
 
 def test_a_moved_mean_moves_what_is_shown(module, sphere, brush):
