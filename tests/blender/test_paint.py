@@ -17,12 +17,17 @@ STROKES = {
     ("MEAN", "GRAB"): {},
     ("MEAN", "FLATTEN"): {"falloff": "SPHERE"},
     ("MEAN", "SMOOTH"): {},
+    ("MEAN", "DEFLATE"): {"value": 0.1, "falloff": "SHARP"},
     ("DEVIATION", "SET"): {"value": 0.15},
     ("DEVIATION", "ADD"): {"value": 1.7, "falloff": "CUSTOM", "curve": tuple(np.linspace(1, 0, 32) ** 2)},
+    ("DEVIATION", "SMOOTH"): {},
     ("LENGTH_SCALE", "SET"): {"value": 0.4, "falloff": "ROOT"},
+    ("LENGTH_SCALE", "ADD"): {"value": 0.6},
+    ("LENGTH_SCALE", "SMOOTH"): {},
     ("ANISOTROPY", "COMB"): {"ratios": (4, 1, 0.5)},
     ("ANISOTROPY", "SMOOTH"): {},
     ("ALBEDO", "SET"): {"color": (0.9, 0.2, 0.1), "falloff": "LINEAR"},
+    ("ALBEDO", "SMOOTH"): {},
 }
 
 
@@ -97,6 +102,11 @@ def test_all_channels_by_script(stage, painted_sphere, gn, fresh_blender, extens
         bpy.ops.ed.redo()
         assert (bpy.context.object.data.filepath, bpy.context.object.data.gpis_strokes) == state
     check_grids(grids_of(gn, bpy.context.object), reference)
+    paint("CONDITION", "PIN", [(0, -1, 0)])
+    assert len(bpy.context.object.gpis.conditions) == 1
+    bpy.ops.ed.undo()
+    assert len(bpy.context.object.gpis.conditions) == 0
+    bpy.ops.ed.redo()
 
     blend = tmp_path / "painted.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))
@@ -114,6 +124,8 @@ def grids():
     return gn.read_vdb(path, names=[g["name"] for g in gn.vdb_grids(path) if "gpis_base" not in g["name"]])
 here = np.load({str(tmp_path / "here.npz")!r})
 before = grids()
+assert [tuple(point.location) for point in obj.gpis.conditions] == [(0, -1, 0)]
+obj.gpis.conditions.clear()  # test_condition_points_are_rendered
 strokes = obj.data.gpis_strokes
 assert bpy.ops.gpis.paint_rebuild() == {{"FINISHED"}}
 after = grids()
@@ -184,6 +196,21 @@ def test_pressure(painted_sphere, bake):
     made = spacing.add((0, 0, 0), 0.5) + spacing.add((1, 0, 0), 0.25) + spacing.finish()
     np.testing.assert_allclose(made.radii, (0.2, 0.1))
     np.testing.assert_allclose(made.strengths, (0.4, 0.2))
+
+
+@pytest.mark.parametrize("pressed", ["radius", "strength"])
+def test_pressure_of_a_stroke(painted_sphere, gn, pressed):
+    """The pen's pressure at each dab scales the one or the other, by the operator as by numpy."""
+    reference = reference_of(gn, painted_sphere)
+    pressures = np.float32((0.3, 1.0, 0.6))
+    stroke = [entry | {"pressure": float(p)} for entry, p in zip(points(arc(3, 3)), pressures, strict=True)]
+    brush = {"radius": RADIUS, "strength": STRENGTH, "spacing": 0.0, "value": 0.2, f"use_pressure_{pressed}": True}
+    assert bpy.ops.gpis.paint_stroke(stroke=stroke, channel="DEVIATION", operation="SET", **brush) == {"FINISHED"}
+    radius, strength = np.float32(RADIUS) * np.ones(3), np.float32(STRENGTH) * np.ones(3)
+    scaled = radius if pressed == "radius" else strength
+    scaled *= pressures
+    reference.apply("deviation", "set", arc(3, 3).astype(float), radius, strength, value=float(np.float32(0.2)))
+    check_grids(grids_of(gn, painted_sphere) | {"anisotropy": reference.tensor, "albedo": reference.albedo}, reference)
 
 
 def test_in_portions_or_at_once(painted_sphere, gn, bake):

@@ -51,9 +51,38 @@ def test_linked_and_appended(painted_sphere, gn, tmp_path, link):
     if link:
         with pytest.raises(RuntimeError, match="is linked from another file: make it local"):
             paint("DEVIATION", "ADD", arc(2), value=2.0)
+        # Local, with data that is not: it gets data and a file of its own, and the library keeps its.
+        obj.select_set(True)
+        bpy.ops.object.make_local(type="SELECT_OBJECT")
+        obj = bpy.context.object
+        assert obj.data.library is not None
+        paint("DEVIATION", "ADD", arc(2), value=2.0)
+        assert obj.data.library is None and file_of(obj).parent == tmp_path / "here" / "scene_gpis"
+        assert np.array_equal(gn.read_vdb(path, names=["mean", "sigma"])["sigma"], expected)
         return
     paint("DEVIATION", "ADD", arc(2), value=2.0)
     assert file_of(obj).parent == tmp_path / "here" / "scene_gpis" and path.is_file()
+
+
+def test_a_copy_that_shares_its_data(painted_sphere, gn, tmp_path):
+    """Alt D: a stroke on the copy leaves the original as it was, also when versions are collected and in the file."""
+    name = painted_sphere.name
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    paint("DEVIATION", "SET", arc(2), value=0.2)
+    expected, strokes = grids_of(gn, painted_sphere)["sigma"], painted_sphere.data.gpis_strokes
+    bpy.ops.object.duplicate(linked=True)
+    copy = bpy.context.object
+    assert copy.data == painted_sphere.data
+    for _ in range(4):
+        paint("DEVIATION", "ADD", arc(2), value=1.5)
+    assert copy.data != painted_sphere.data and copy.data.gpis_strokes.startswith(strokes)
+    changed, copied = grids_of(gn, copy)["sigma"], copy.name
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
+    original, copy = bpy.data.objects[name], bpy.data.objects[copied]
+    assert original.data.gpis_strokes == strokes
+    assert np.array_equal(grids_of(gn, original)["sigma"], expected)
+    assert np.array_equal(grids_of(gn, copy)["sigma"], changed) and not np.array_equal(changed, expected)
 
 
 def test_packed_strokes(painted_sphere, gn, bake, tmp_path):
@@ -121,13 +150,22 @@ def test_undo_to_a_version_that_is_no_longer_on_disk(painted_sphere, gn, extensi
 
 
 KILLED = """
-import bpy, sys, os
+import bpy, importlib
 assert bpy.ops.extensions.package_install_files(
     filepath={zip!r}, repo="user_default", enable_on_install=True) == {{"FINISHED"}}
 bpy.ops.mesh.primitive_uv_sphere_add(segments=32, ring_count=16)
-bpy.ops.gpis.make(resolution=48)
+bpy.ops.gpis.make(resolution=96)
 bpy.ops.wm.save_as_mainfile(filepath={blend!r})
 print("saved", flush=True)
+bake = importlib.import_module("bl_ext.user_default.gpis.paint.bake")
+new_path = bake.files.new_path
+
+def told(*arguments, **keywords):
+    path = new_path(*arguments, **keywords)
+    print("bakes", path, flush=True)
+    return path
+
+bake.files.new_path = told
 for i in range(10000):
     place = ((i * 0.37) % 2 - 1, (i * 0.61) % 2 - 1, 0.5)
     bpy.ops.gpis.paint_stroke(
@@ -136,8 +174,32 @@ for i in range(10000):
 """
 
 
-def test_killed_while_painting(extension_zip, gn, bake, stage, tmp_path):
-    """kill -9 in the middle of many strokes: all but the last one that was begun are there again."""
+def stopped_in_a_bake(process, path, share):
+    """Stop the process while it writes this file, when it has written that share of the version before; whether it was."""
+    partial = path.with_name(path.name + ".part")
+    versions = sorted(path.parent.glob("*.vdb"), key=lambda version: version.stat().st_mtime_ns)
+    wanted = share * versions[-1].stat().st_size
+    end = time.monotonic() + 20
+    while not path.exists() and time.monotonic() < end:
+        try:
+            reached = partial.stat().st_size >= wanted
+        except FileNotFoundError:
+            continue
+        if reached:
+            process.send_signal(signal.SIGSTOP)
+            while Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()[0] != "T":
+                pass
+            # It stands still: nothing is renamed any more between the look and the kill.
+            if partial.exists():
+                return True
+            process.send_signal(signal.SIGCONT)
+            return False
+    return False
+
+
+@pytest.mark.parametrize("share", [0.0, 0.6])
+def test_killed_while_painting(extension_zip, gn, bake, stage, tmp_path, share):
+    """kill -9 in the middle of the bake of a stroke: all but that one are there again."""
     script, blend = tmp_path / "script.py", tmp_path / "killed.blend"
     script.write_text(KILLED.format(zip=str(extension_zip), blend=str(blend)))
     (tmp_path / "user").mkdir()
@@ -148,25 +210,29 @@ def test_killed_while_painting(extension_zip, gn, bake, stage, tmp_path):
         stderr=subprocess.STDOUT,
         text=True,
     )
-    done, lines = 0, []
+    done, caught, lines = 0, None, []
     for line in process.stdout:
         lines.append(line)
         if line.startswith("stroke "):
             done = int(line.split()[1])
-        if done >= 12:
-            time.sleep(0.013)  # somewhere in a bake
-            process.send_signal(signal.SIGKILL)
-            break
-    assert done, "".join(lines)
+        if line.startswith("bakes ") and done >= 2:
+            path = Path(line.removeprefix("bakes ").strip())
+            if stopped_in_a_bake(process, path, share):
+                caught = path
+                process.send_signal(signal.SIGKILL)
+                break
+        assert done < 200, "no bake was caught"
+    assert caught is not None, "".join(lines)
     done = max([done] + [int(line.split()[1]) for line in process.stdout if line.startswith("stroke ")])
     process.wait()
+    assert not caught.exists() and caught.with_name(caught.name + ".part").exists(), "killed inside of the bake"
 
     bpy.ops.wm.open_mainfile(filepath=str(blend))
     obj = bpy.context.object
     assert not obj.data.gpis_strokes, "saved before the first stroke"
     assert bpy.ops.gpis.paint_recover() == {"FINISHED"}
     found = len(obj.data.gpis_strokes.split("\n"))
-    assert done <= found <= done + 1
+    assert found == done
     # And it is whole: the same strokes on what was there before make the same grid.
     expected = grids_of(gn, obj)["mean"]
     assert bpy.ops.gpis.paint_rebuild() == {"FINISHED"}
