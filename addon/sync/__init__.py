@@ -15,14 +15,15 @@ __all__ = ["Sync", "SyncError", "describe", "explain"]
 def describe(depsgraph, width, height, view=None):
     """The description of a frame of `width` × `height` pixels, as a Sync (its `description`, `warnings`).
 
-    view: the description of another camera than the scene's.
+    view: the description of the camera of a viewport. It shows what a render of the frame would: not the mesh that a
+    GPIS object was made of, though Blender has both there.
     """
     sync = Sync(depsgraph)
     sync.description["settings"] = settings.describe(sync)
     sync.description["camera"] = camera.describe(sync, width, height) if view is None else view
     sync.description["world"] = world.describe(sync)
     for instance in depsgraph.object_instances:
-        if instance.show_self:
+        if instance.show_self and not (view is not None and instance.object.hide_render):
             _add(sync, instance.object, instance.matrix_world)
     return sync
 

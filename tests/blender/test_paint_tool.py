@@ -156,7 +156,13 @@ def extents(corners):
 @pytest.mark.parametrize(
     ("lengths", "seen"),
     # At the top of the sphere, combed along x: in x, y and z, against the longest of them.
-    [((6, 1, 1), (1, 1 / 6, 0)), ((1, 6, 1), (1 / 6, 1, 0)), ((6, 6, 1), (1, 1, 0)), ((1, 1, 6), (1 / 6, 1 / 6, 1)), ((6, 1, 6), (1, 0, 1))],
+    [
+        ((6, 1, 1), (1, 1 / 6, 0)),
+        ((1, 6, 1), (1 / 6, 1, 0)),
+        ((6, 6, 1), (1, 1, 0)),
+        ((1, 1, 6), (1 / 6, 1 / 6, 1)),
+        ((6, 1, 6), (1, 0, 1)),
+    ],
 )
 def test_every_anisotropy_is_seen(module, sphere, brush, lengths, seen):
     """Needles, discs and bumps that stand on the surface; without one nothing is drawn."""

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from . import support
 from .painting import arc, paint
 
 SIZE = (24, 18)
@@ -79,7 +78,8 @@ def test_it_starts_again_after_a_change_and_only_then(preview, stage):
     paint("ALBEDO", "SET", arc(0), radius=3.0, strength=1.0, color=(1, 0, 0), falloff="CONSTANT")
     red = show(preview)
     middle = np.s_[6:12, 9:15]
-    assert red[middle][..., 1].mean() < 0.5 * before[middle][..., 1].mean(), "painted red"
+    # The mesh that it was made of is white, at the same place, and not in the picture.
+    assert red[middle][..., 1].mean() < 0.1 * before[middle][..., 1].mean(), "painted red"
 
 
 def test_pictures_go_to_the_gpu_once_each(preview, module, monkeypatch):
