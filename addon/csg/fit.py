@@ -30,7 +30,7 @@ class _Query:
     def __init__(self, context, obj, *, resolution, realisations, method):
         depsgraph = context.evaluated_depsgraph_get()
         self.owner = obj
-        composed = gpis.composed_of(Sync(depsgraph), obj.evaluated_get(depsgraph), blends=True)
+        composed = gpis.composed_of(Sync(depsgraph), obj.evaluated_get(depsgraph))
         self.arguments = ([composed.process], "union", composed.bounds, resolution, realisations)
         self.method = method.lower()
 
