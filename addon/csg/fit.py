@@ -69,7 +69,7 @@ def summary(fit, realisations, method):
     if len(lengths):
         lines.append(f"Length scales {lengths.min():.2g} to {lengths.max():.2g}.")
     if counters["length_scales_limited"]:
-        lines.append(f"At {counters['length_scales_limited']:,} voxels they were brought into one voxel to 100 diagonals.")
+        lines.append(f"At {counters['length_scales_limited']:,} voxels they were brought into one voxel to 4 diagonals.")
     return " ".join(lines)
 
 
