@@ -193,3 +193,10 @@ def test_bad_input_gets_a_sentence(change, sentence):
     }
     with pytest.raises(ValueError, match=sentence):
         gn.compose_and_fit(**(query | change))
+
+
+def test_operands_with_conditions_are_refused():
+    known = {"points": [[0, 0, 0.2]], "values": [0.1]}
+    with pytest.raises(ValueError, match="Operand 1 has conditions; a fit takes operands without"):
+        pinned = gn.GaussianProcess(0.1, 0.2, gn.SquaredExponential(0.5), conditions=known)
+        gn.compose_and_fit([sphere(0, 1, 0.1), pinned], "union", ((-1, -1, -1), (1, 1, 1)), 5, 10)
