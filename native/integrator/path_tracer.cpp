@@ -362,12 +362,10 @@ std::optional<ScatterSample> PathTracer::Impl::scatter_at(const Ray& ray, const 
     if (!scatter.specular()) direct = sample_lights(v, scatter, [](const Vec3&, PathMemory&) {});
     return scatter.sample(point(kDirectionDecision, *rng));
   }
-
   const Scene::Impl::Body& body = scene.bodies[v.body];
-  const std::size_t leaves = body.surface.leaves().size();
-  const auto states = [&](PathMemory& of) { return std::span(of).subspan(body.first, leaves); };
-  const HitGradient found(body.surface, {&lines[body.first], leaves},
-                          {v.t, v.surface - static_cast<int>(body.first)}, states(memory), *rng);
+  const auto here = [&](auto& of) { return std::span(of).subspan(body.first); };
+  const HitGradient found(body.surface, here(lines),
+                          {v.t, v.surface - static_cast<int>(body.first)}, here(memory), *rng);
   const GradientLaw& law = found.law();
   Vec3 gradient = law.mean;
   if (!law.certain()) {
@@ -375,12 +373,12 @@ std::optional<ScatterSample> PathTracer::Impl::scatter_at(const Ray& ray, const 
     gradient += law.b1 * xi1 + law.b2 * xi2;
     counters->line_normals += 2;
   }
-  found.remember(gradient, states(memory));
+  found.remember(gradient, here(memory));
   normal = normalize(gradient) * (v.inside ? -1 : 1);
   if (v.material->specular() && !law.degenerate) {  // normals have a density to light them by
     const auto lit = [&](const auto& way) {
       return sample_lights(v, way, [&](const Vec3& w, PathMemory& m) {
-        found.remember(*way.gradient_for(w), states(m));
+        found.remember(*way.gradient_for(w), here(m));
       });
     };
     if (v.material->relative_index() == 0) {

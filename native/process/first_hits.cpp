@@ -97,17 +97,26 @@ FirstHits first_hits(const TreeSurface& surface, const FirstHitsQuery& query) {
         result.leaf[i] = hit.leaf;
         result.position[i] = query.rays[i].at(hit.t);
         std::vector<std::optional<State>> states(leaves);
+        const auto draw = [&] {
+          const HitGradient found(surface, lines, hit, states, rng);
+          counters.line_normals += 2;
+          result.gradient[i] = found.law().draw(rng);
+          found.remember(result.gradient[i], states);
+        };
+        // Where leaves are blended, the gradient is one given those of the others.
+        const bool last = surface.tree().has_blends();
         for (std::size_t k = 0; k < leaves; ++k) {
           const ProcessSurface& leaf = surface.leaves()[k];
-          if (static_cast<int>(k) == hit.leaf || !leaf.sampled_at(lines[k], hit.t)) continue;
+          if (static_cast<int>(k) == hit.leaf) {
+            if (!last) draw();
+            continue;
+          }
+          if (!leaf.sampled_at(lines[k], hit.t)) continue;
           counters.line_normals += 2;
           const double value = leaf.value(lines[k], hit.t, rng);
           states[k] = leaf.state(value, leaf.gradient_law(lines[k], hit.t, rng).draw(rng));
         }
-        const HitGradient found(surface, lines, hit, states, rng);
-        counters.line_normals += 2;
-        result.gradient[i] = found.law().draw(rng);
-        found.remember(result.gradient[i], states);
+        if (last) draw();
         for (std::size_t k = 0; k < leaves; ++k) {
           if (!states[k]) continue;
           result.state_value[i * leaves + k] = states[k]->value;
