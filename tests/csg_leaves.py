@@ -39,6 +39,24 @@ class Leaf:
         return self.mean + self.sigma * g
 
 
+def draw(leaves, shared, n, rng):
+    """g of each leaf (n, points)."""
+    groups = shared if isinstance(shared, tuple) else [0] * len(leaves) if shared else range(len(leaves))
+    drawn = {}
+    return [drawn[k] if k in drawn else drawn.setdefault(k, leaf.noise(n, rng)) for k, leaf in zip(groups, leaves, strict=True)]
+
+
+def conditioned(leaf, length_scale, n, rng, value, slope):
+    """g on the axis given value and, unless None, slope (n,) at x = 0; squared exponential."""
+    d = X / length_scale
+    k = np.exp(-(d**2) / 2)
+    covariance = leaf.covariance - np.outer(k, k) * (1 + np.outer(d, d) * (slope is not None))
+    g = normals(covariance, n, rng) + np.multiply.outer(value, k)
+    if slope is not None:
+        g += np.multiply.outer(slope * length_scale, d * k)
+    return g
+
+
 def sphere(x, y, radius, sigma, length_scale):
     return Leaf(gn.SphereField([x, y, 0], radius), sigma, length_scale)
 

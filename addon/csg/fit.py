@@ -30,7 +30,8 @@ class _Query:
     def __init__(self, context, obj, *, resolution, realisations, method):
         depsgraph = context.evaluated_depsgraph_get()
         self.owner = obj
-        composed = gpis.composed_of(Sync(depsgraph), obj.evaluated_get(depsgraph), blends=True)
+        composed = gpis.composed_of(Sync(depsgraph), obj.evaluated_get(depsgraph))
+        self.materials = composed.materials
         self.arguments = ([composed.process], "union", composed.bounds, resolution, realisations)
         self.method = method.lower()
 
@@ -69,7 +70,7 @@ def summary(fit, realisations, method):
     if len(lengths):
         lines.append(f"Length scales {lengths.min():.2g} to {lengths.max():.2g}.")
     if counters["length_scales_limited"]:
-        lines.append(f"At {counters['length_scales_limited']:,} voxels they were brought into one voxel to 100 diagonals.")
+        lines.append(f"At {counters['length_scales_limited']:,} voxels they were brought into one voxel to 4 diagonals.")
     return " ".join(lines)
 
 
@@ -253,6 +254,9 @@ class GPIS_OT_csg_fit_run(_Fit, bpy.types.Operator):
             return {"CANCELLED"}
         obj = work.query.owner
         sentence = summary(work.result, self.realisations, self.method)
+        first, *others = work.query.materials
+        if any(other != first for other in others):
+            sentence += f' All of it has the material of "{obj.name}"; those of other operands are not kept.'
         fitted = make_volume(context, obj, work.result, sentence)
         self.report({"INFO"}, f'"{fitted.name}" is fitted; "{obj.name}" is no longer rendered itself. {sentence}')
         return {"FINISHED"}

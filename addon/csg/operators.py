@@ -1,7 +1,7 @@
 """Operators of the list of operands."""
 
 import bpy
-from bpy.props import EnumProperty
+from bpy.props import EnumProperty, IntProperty
 
 from .properties import OPERATIONS
 
@@ -124,7 +124,92 @@ class GPIS_OT_csg_move(_ListOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
-_CLASSES = (GPIS_OT_csg_add, GPIS_OT_csg_remove, GPIS_OT_csg_move)
+class Drag:
+    """An item of the list that follows the mouse from row to row."""
+
+    def __init__(self, obj, index, y, row_height):
+        self._obj, self._from, self._y, self._row_height = obj, index, y, row_height
+        self.at = index
+        self._active = obj.gpis_csg.active
+
+    def follow(self, y):
+        """To the row where the mouse is, y upwards; whether that is another one than before."""
+        return self.move(self._from + round((self._y - y) / self._row_height))
+
+    def move(self, to):
+        settings = self._obj.gpis_csg
+        to = max(0, min(to, len(settings.items) - 1))
+        if to == self.at:
+            return False
+        settings.items.move(self.at, to)
+        settings.active = self.at = to
+        self._obj.update_tag()
+        return True
+
+    def put_back(self):
+        self.move(self._from)
+        self._obj.gpis_csg.active = self._active
+
+
+class GPIS_OT_csg_drag(_ListOperator, bpy.types.Operator):
+    """Take this operand by the grip, move it to where it belongs in the list, and click. Esc puts it back"""
+
+    bl_idname = "gpis.csg_drag"
+    bl_label = "Drag Operand"
+
+    index: IntProperty(name="From", min=0, options={"SKIP_SAVE"})
+    to: IntProperty(name="To", min=0, options={"SKIP_SAVE"})
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and len(context.object.gpis_csg.items) > 1
+
+    def execute(self, context):
+        settings = context.object.gpis_csg
+        if self.index >= len(settings.items):
+            self.report({"ERROR"}, f"The list has no operand {self.index}; it has {len(settings.items)}, counted from 0.")
+            return {"CANCELLED"}
+        return {"FINISHED"} if Drag(context.object, self.index, 0, 1).move(self.to) else {"CANCELLED"}
+
+    def invoke(self, context, event):
+        settings = context.object.gpis_csg
+        if self.index >= len(settings.items):
+            return {"CANCELLED"}
+        settings.active = self.index
+        self._drag = Drag(context.object, self.index, event.mouse_y, 20 * context.preferences.system.ui_scale)
+        self._area = context.area
+        context.window.cursor_modal_set("SCROLL_Y")
+        context.workspace.status_text_set("Move: to another row   Click, Enter: leave it there   Right click, Esc: put it back")
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        if event.type == "MOUSEMOVE":
+            if self._drag.follow(event.mouse_y):
+                self._area.tag_redraw()
+            return {"RUNNING_MODAL"}
+        if event.type in {"ESC", "RIGHTMOUSE"}:
+            return self._end(context, kept=False)
+        if event.type in {"LEFTMOUSE", "RET", "NUMPAD_ENTER"}:
+            return self._end(context, kept=True)
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, context):
+        self._end(context, kept=False)
+
+    def _end(self, context, kept):
+        context.window.cursor_modal_restore()
+        context.workspace.status_text_set(None)
+        if not kept:
+            self._drag.put_back()
+        self._area.tag_redraw()
+        if not kept or self._drag.at == self.index:
+            return {"CANCELLED"}
+        self.to = self._drag.at
+        return {"FINISHED"}
+
+
+_CLASSES = (GPIS_OT_csg_add, GPIS_OT_csg_remove, GPIS_OT_csg_move, GPIS_OT_csg_drag)
 
 
 register, unregister = bpy.utils.register_classes_factory(_CLASSES)

@@ -13,6 +13,7 @@ class GPIS_UL_csg(bpy.types.UIList):
     def draw_item(self, context, layout, data, item, icon, active_data, active_property, index=0, flt_flag=0):
         row = layout.row(align=True)
         row.active = item.enabled
+        row.operator("gpis.csg_drag", text="", icon="GRIP", emboss=False).index = index
         row.prop(item, "operation", text="", icon=_ICONS[item.operation], icon_only=True, emboss=False)
         if item.object is None:
             row.label(text="Choose an operand", icon="ERROR")

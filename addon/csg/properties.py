@@ -7,13 +7,7 @@ OPERATIONS = (
     ("UNION", "Union", "What is inside of either", "SELECT_EXTEND", 0),
     ("INTERSECTION", "Intersection", "What is inside of both", "SELECT_INTERSECT", 1),
     ("DIFFERENCE", "Difference", "What is inside of the object so far, but not of this operand", "SELECT_SUBTRACT", 2),
-    (
-        "SMOOTH_UNION",
-        "Smooth Union",
-        "A union with a rounded crease. It is not rendered live: fit it, and render the fit",
-        "MOD_SMOOTH",
-        3,
-    ),
+    ("SMOOTH_UNION", "Smooth Union", "A union with a rounded crease", "MOD_SMOOTH", 3),
 )
 
 CORRELATIONS = (

@@ -20,9 +20,9 @@ class Composed:
         self.process, self.materials, self.bounds = process, material_names, bounds
 
 
-def compose(sync, owner, obj, matrix, process_of, *, blends=False, above=()):
-    """The object with its operands. `process_of(obj)` gives (process, bounds) of one object without its list; `blends`:
-    smooth unions are wanted, for a fit. `above`: names of the objects whose operand this is."""
+def compose(sync, owner, obj, matrix, process_of, *, above=()):
+    """The object with its operands. `process_of(obj)` gives (process, bounds) of one object without its list;
+    `above`: names of the objects whose operand this is."""
     process, bounds = process_of(obj)
     result = Composed(process, materials.of_object(sync, obj)[:1], bounds)
     settings = obj.gpis_csg
@@ -34,19 +34,19 @@ def compose(sync, owner, obj, matrix, process_of, *, blends=False, above=()):
             raise SyncError(
                 f'{owner}: its CSG list leads back to itself by "{item.object.name}": remove it from one of the lists.'
             )
-        operand = _operand(sync, owner, obj, matrix, item, process_of, blends, above)
-        result = _combine(owner, result, operand, item, shared, blends)
+        operand = _operand(sync, owner, obj, matrix, item, process_of, above)
+        result = _combine(owner, result, operand, item, shared)
     return result
 
 
-def _operand(sync, owner, obj, matrix, item, process_of, blends, above):
+def _operand(sync, owner, obj, matrix, item, process_of, above):
     evaluated = item.object.evaluated_get(sync.depsgraph)
     if evaluated.type != "VOLUME" or not evaluated.gpis.enabled:
         raise SyncError(f'{owner}: the operand "{evaluated.name}" of its CSG list is no GPIS: switch GPIS on, or remove it.')
     placed = array(evaluated.matrix_world)
     if abs(np.linalg.det(placed[:3, :3])) <= 1e-12 * max(np.linalg.norm(placed[:3, :3], axis=0).max(), 1e-30) ** 3:
         raise SyncError(f'{owner}: the operand "{evaluated.name}" is scaled to zero along an axis: clear its scale.')
-    operand = compose(sync, owner, evaluated, placed, process_of, blends=blends, above=(*above, obj.name_full))
+    operand = compose(sync, owner, evaluated, placed, process_of, above=(*above, obj.name_full))
     to_object = np.linalg.inv(matrix) @ placed
     to_object[3] = (0, 0, 0, 1)
     if not np.allclose(to_object, np.eye(4), rtol=0, atol=1e-12):
@@ -55,7 +55,7 @@ def _operand(sync, owner, obj, matrix, item, process_of, blends, above):
     return operand
 
 
-def _combine(owner, a, b, item, shared, blends):
+def _combine(owner, a, b, item, shared):
     gn = native()
     names = a.materials + b.materials
     around = tuple(np.minimum(a.bounds[0], b.bounds[0])), tuple(np.maximum(a.bounds[1], b.bounds[1]))
@@ -63,11 +63,6 @@ def _combine(owner, a, b, item, shared, blends):
         if item.operation == "UNION":
             return Composed(gn.union(a.process, b.process, shared_noise=shared), names, around)
         if item.operation == "SMOOTH_UNION":
-            if not blends:
-                raise SyncError(
-                    f'{owner}: its CSG list has "{item.object.name}" as a Smooth Union, which is not rendered live: fit it '
-                    "(Object properties, GPIS, CSG) and render the fit, or choose Union."
-                )
             tree = gn.smooth_union(a.process, b.process, blend=item.blend, shared_noise=shared)
             return Composed(tree, names, around)
         if item.operation == "DIFFERENCE":

@@ -41,13 +41,13 @@ def add(sync, obj, matrix_world):
     )
 
 
-def composed_of(sync, obj, blends=False):
+def composed_of(sync, obj):
     """The object with the operands of its CSG list, as a sync.csg.Composed in its own space."""
 
     def process_and_bounds(one):
         return process_of(sync, one), bounds_of(one)
 
-    return csg.compose(sync, f'GPIS object "{obj.name}"', obj, array(obj.matrix_world), process_and_bounds, blends=blends)
+    return csg.compose(sync, f'GPIS object "{obj.name}"', obj, array(obj.matrix_world), process_and_bounds)
 
 
 def process_of(sync, obj):

@@ -130,7 +130,7 @@ nothing is drawn; inf draws everywhere. progress(fraction) may return False to c
 Returns mean, sigma (X, Y, Z), anisotropy (X, Y, Z, 6), the squared length scales of a squared exponential; mean_error and
 sigma_error, their standard errors; skewness, and kolmogorov, the distance of the distribution to the normal one (0 where nothing
 is drawn); origin (3,), voxel_size, and counters: voxels, voxels_drawn, voxels_filled (of the boxes around them), length_scales_limited (brought into one
-voxel to 100 diagonals), change_limited (where lengths change too fast for their own gradients to be told apart), seconds.)");
+voxel to 4 diagonals), change_limited (where lengths change too fast for their own gradients to be told apart), seconds.)");
   m.def(
       "compose_and_fit_plan", &plan, "operands"_a, "op"_a, "bounds"_a, "resolution"_a,
       "realisations"_a, py::kw_only(), "method"_a = "sample", "blend"_a = 0.0,

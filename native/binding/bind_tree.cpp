@@ -111,8 +111,8 @@ void bind_tree(py::module_& m) {
       },
       "blend"_a, "shared_noise"_a = false,
       "A union whose crease is rounded where two operands are within `blend` of each other: "
-      "min - max(0, blend - |a - b|)²/4blend, one\noperand after the other. For "
-      "compose_and_fit; renders refuse it.");
+      "min - max(0, blend - |a - b|)²/4blend, one\noperand after the other. "
+      "f is not rescaled by transforms, and `blend` is in its units.");
   m.def(
       "intersection",
       [](const py::args& operands, bool shared_noise) {

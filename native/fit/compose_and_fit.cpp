@@ -16,6 +16,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+// The longest length scales, in diagonals of the bounds: there g differs from one that is constant
+// by a correlation of 3 % at most, and samplers of lines need not resolve what nobody sees.
+constexpr double kMostDiagonals = 4;
 constexpr auto kProgressInterval = std::chrono::milliseconds(100);
 // Of the bricks of normals that one realisation of one source keeps (process/lattice_noise.h).
 constexpr double kNoiseMemory = 4e6;
@@ -101,7 +104,7 @@ class Fitter {
       const Vec3 diagonal = query_.bounds.max - query_.bounds.min;
       const AnisotropyFit lengths =
           fit_anisotropy(fit.anisotropy, nodes_.resolution, nodes_.voxel_size, nodes_.voxel_size,
-                         100 * length(diagonal),
+                         kMostDiagonals * length(diagonal),
                          [this](int n, const std::function<void(int)>& work) { each(n, work); });
       fit.length_scales_limited = lengths.limited;
       fit.change_limited = lengths.change_limited;

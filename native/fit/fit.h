@@ -33,7 +33,7 @@ struct Fit {
 
   // Nodes that were sampled, and those of the boxes around them that realisations were filled in.
   std::size_t voxels_drawn = 0, voxels_filled = 0;
-  // Nodes whose length scales were brought into [voxel_size, 100 diagonals], and those where the
+  // Nodes whose length scales were brought into [voxel_size, 4 diagonals], and those where the
   // part of Cov ∇g that comes of their change (definitions E3) was limited to three quarters.
   std::size_t length_scales_limited = 0, change_limited = 0;
   double seconds = 0;

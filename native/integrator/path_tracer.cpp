@@ -3,6 +3,7 @@
 #include "integrator/dielectric_scatter.h"
 #include "integrator/reach.h"
 #include "integrator/scatter.h"
+#include "process/hit_gradient.h"
 #include "process/realisation_memory.h"
 #include "process/segment_memory.h"
 #include "scene/scene_impl.h"
@@ -87,7 +88,7 @@ struct PathTracer::Impl {
   std::vector<char> met;
   std::vector<Line> shadow_lines;
   std::vector<Start> starts;
-  TreeMarch march;
+  TreeSurface::March march;
   PathMemory memory, shadow_memory;
   // That the path sees, of memory `global`; a shadow ray sees a copy.
   std::vector<RealisationMemory> realisations, shadow_realisations;
@@ -361,24 +362,23 @@ std::optional<ScatterSample> PathTracer::Impl::scatter_at(const Ray& ray, const 
     if (!scatter.specular()) direct = sample_lights(v, scatter, [](const Vec3&, PathMemory&) {});
     return scatter.sample(point(kDirectionDecision, *rng));
   }
-
-  const ProcessSurface& surface = scene.stochastic[v.surface].surface;
-  // Of the object: a subtracted leaf is left where it grows.
-  const double sign = scene.stochastic[v.surface].sign;
-  GradientLaw law = surface.gradient_law(lines[v.surface], v.t, *rng);
-  law.mean = law.mean * sign;
+  const Scene::Impl::Body& body = scene.bodies[v.body];
+  const auto here = [&](auto& of) { return std::span(of).subspan(body.first); };
+  const HitGradient found(body.surface, here(lines),
+                          {v.t, v.surface - static_cast<int>(body.first)}, here(memory), *rng);
+  const GradientLaw& law = found.law();
   Vec3 gradient = law.mean;
   if (!law.certain()) {
     const auto [xi1, xi2] = square_to_normals(point(kGradientDecision, *rng));
     gradient += law.b1 * xi1 + law.b2 * xi2;
     counters->line_normals += 2;
   }
-  memory[v.surface] = surface.state(0, gradient * sign);
+  found.remember(gradient, here(memory));
   normal = normalize(gradient) * (v.inside ? -1 : 1);
   if (v.material->specular() && !law.degenerate) {  // normals have a density to light them by
     const auto lit = [&](const auto& way) {
       return sample_lights(v, way, [&](const Vec3& w, PathMemory& m) {
-        m[v.surface] = surface.state(0, *way.gradient_for(w) * sign);
+        found.remember(*way.gradient_for(w), here(m));
       });
     };
     if (v.material->relative_index() == 0) {

@@ -8,6 +8,8 @@
 #include <chrono>
 #include <future>
 
+#include "process/hit_gradient.h"
+
 namespace gpis {
 namespace {
 
@@ -18,7 +20,7 @@ Counters for_each_hit(const TreeSurface& surface, const FirstHitsQuery& query,
   struct Worker {
     std::vector<Line> lines;
     std::vector<Start> starts;
-    TreeMarch march;
+    TreeSurface::March march;
     Counters counters;
   };
   tbb::enumerable_thread_specific<Worker> workers;
@@ -86,32 +88,45 @@ FirstHits first_hits(const TreeSurface& surface, const FirstHitsQuery& query) {
     result.segments = query.segments;
     result.segments.resize(rays * leaves);
   }
-  result.counters =
-      for_each_hit(surface, query, result.realisation,
-                   [&](std::size_t i, std::vector<Line>& lines, const TreeHit& hit, Rng& rng,
-                       Counters& counters) {
-                     if (hit.leaf < 0) return;
-                     result.t[i] = hit.t;
-                     result.leaf[i] = hit.leaf;
-                     result.position[i] = query.rays[i].at(hit.t);
-                     for (std::size_t k = 0; k < leaves; ++k) {
-                       const ProcessSurface& leaf = surface.leaves()[k];
-                       if (!leaf.sampled_at(lines[k], hit.t)) continue;
-                       const bool winner = static_cast<int>(k) == hit.leaf;
-                       const double value = winner ? 0 : leaf.value(lines[k], hit.t, rng);
-                       counters.line_normals += 2;
-                       const Vec3 gradient = leaf.gradient_law(lines[k], hit.t, rng).draw(rng);
-                       const State state = leaf.state(value, gradient);
-                       result.state_value[i * leaves + k] = state.value;
-                       result.state_gradient[i * leaves + k] = state.gradient;
-                       if (!result.segments.empty()) {
-                         SegmentMemory& kept = result.segments[i * leaves + k];
-                         leaf.keep_segment(lines[k], hit.t, kept);
-                         leaf.keep_end(result.position[i], state, kept);
-                       }
-                       if (winner) result.gradient[i] = gradient * surface.sign(hit.leaf);
-                     }
-                   });
+  result.counters = for_each_hit(
+      surface, query, result.realisation,
+      [&](std::size_t i, std::vector<Line>& lines, const TreeHit& hit, Rng& rng,
+          Counters& counters) {
+        if (hit.leaf < 0) return;
+        result.t[i] = hit.t;
+        result.leaf[i] = hit.leaf;
+        result.position[i] = query.rays[i].at(hit.t);
+        std::vector<std::optional<State>> states(leaves);
+        const auto draw = [&] {
+          const HitGradient found(surface, lines, hit, states, rng);
+          counters.line_normals += 2;
+          result.gradient[i] = found.law().draw(rng);
+          found.remember(result.gradient[i], states);
+        };
+        // Where leaves are blended, the gradient is one given those of the others.
+        const bool last = surface.tree().has_blends();
+        for (std::size_t k = 0; k < leaves; ++k) {
+          const ProcessSurface& leaf = surface.leaves()[k];
+          if (static_cast<int>(k) == hit.leaf) {
+            if (!last) draw();
+            continue;
+          }
+          if (!leaf.sampled_at(lines[k], hit.t)) continue;
+          counters.line_normals += 2;
+          const double value = leaf.value(lines[k], hit.t, rng);
+          states[k] = leaf.state(value, leaf.gradient_law(lines[k], hit.t, rng).draw(rng));
+        }
+        if (last) draw();
+        for (std::size_t k = 0; k < leaves; ++k) {
+          if (!states[k]) continue;
+          result.state_value[i * leaves + k] = states[k]->value;
+          result.state_gradient[i * leaves + k] = states[k]->gradient;
+          if (result.segments.empty()) continue;
+          SegmentMemory& kept = result.segments[i * leaves + k];
+          surface.leaves()[k].keep_segment(lines[k], hit.t, kept);
+          surface.leaves()[k].keep_end(result.position[i], *states[k], kept);
+        }
+      });
   return result;
 }
 

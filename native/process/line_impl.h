@@ -28,6 +28,7 @@ struct Line::Impl {
 
   // The hit, of f or -f: fields and g by the piece and cell of the arriving side, dg per t.
   double hit_t = kInfinity, hit_g = 0, hit_dg = 0;
+  double hit_value = 0;  // f there, not 0 where a smooth union blends it with others
   FieldSample hit_mean, hit_sigma;
 
   // A leaf of a tree that sees the g of another leaf: that one's line holds the path.

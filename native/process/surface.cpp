@@ -95,6 +95,7 @@ double ProcessSurface::first_hit(Line& line, const Ray& ray, double t_max, const
   Line::Impl& l = line.impl();
   l.stretches.clear();
   l.hit_t = kInfinity;
+  l.hit_value = 0;
   l.inside = start.inside;
   l.plan = start.inside ? planned_inside_.get() : planned_.get();
   l.shared = nullptr;
@@ -145,7 +146,7 @@ bool ProcessSurface::sampled_at(const Line& line, double t) const {
 
 double ProcessSurface::value(Line& line, double t, Rng& rng) const {
   Line::Impl& l = line.impl();
-  if (t == l.hit_t) return 0;
+  if (t == l.hit_t) return l.hit_value;
   double g, dg;
   const PathOf path(l);
   path.sampler.path_at(path.line, t, rng, g, dg);

@@ -43,7 +43,7 @@ bool same_noise(const GaussianProcess& a, const GaussianProcess& b) {
 
 TreePtr ProcessTree::single(std::shared_ptr<const GaussianProcess> process) {
   auto tree = std::make_shared<ProcessTree>();
-  tree->leaves_ = {{std::move(process), 1, 0}};
+  tree->leaves_ = {{std::move(process), 1, 0, 0}};
   tree->nodes_ = {{Kind::leaf, 0, 0, {}}};
   tree->noises_ = 1;
   return tree;
@@ -67,6 +67,7 @@ TreePtr ProcessTree::combine(Kind kind, const std::vector<TreePtr>& parts, bool 
     const int first_node = static_cast<int>(tree->nodes_.size());
     for (Leaf leaf : part->leaves_) {
       leaf.noise = shared_noise ? 0 : leaf.noise + tree->noises_;
+      leaf.lift += top.blend;
       tree->leaves_.push_back(std::move(leaf));
     }
     for (Node node : part->nodes_) {
@@ -157,7 +158,8 @@ double ProcessTree::compose(const double* values, double* weights) const {
       double share = 0;
       if (n.blend > 0) {
         const int other = winner == n.children[0] ? n.children[1] : n.children[0];
-        share = std::max(n.blend - std::abs(value[other] - value[winner]), 0.0) / (2 * n.blend);
+        const double apart = std::abs(value[other] - value[winner]);
+        share = apart < n.blend ? (n.blend - apart) / (2 * n.blend) : 0.0;
         weight[other] = share * weight[k];
       }
       weight[winner] = (1 - share) * weight[k];

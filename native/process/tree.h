@@ -2,7 +2,7 @@
 // intersection the greatest, difference max(a, -b), complement -a. Normal form: complements are
 // pushed down to the leaves (De Morgan), so inner nodes are least and greatest alone and every sign
 // of F follows from signs of leaves. A smooth union rounds the crease where two parts are within
-// its blend radius of each other; fits compose it, marches refuse it. Immutable.
+// its blend radius of each other: F depends on their values there (blend_march.h). Immutable.
 #pragma once
 
 #include <memory>
@@ -24,6 +24,9 @@ class ProcessTree {
     std::shared_ptr<const GaussianProcess> process;
     double sign = 1;  // -1: the leaf counts as its complement
     int noise = 0;    // leaves of one number see the same g
+    // Blend radii above it, summed up: F takes its sign from others wherever the leaf is farther
+    // than this from 0 on the side where they decide, and from the leaf alone on the other.
+    double lift = 0;
   };
   struct Node {
     Kind kind = Kind::leaf;
@@ -76,7 +79,8 @@ class ProcessTree {
       if (s == dominant) return dominant;
       all = all && s != 0;
     }
-    return all ? -dominant : 0;
+    // A blend reaches beyond the least of its parts.
+    return all && n.blend == 0 ? -dominant : 0;
   }
 
   // Visits the leaves that leave the sign at a node unknown.

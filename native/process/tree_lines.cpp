@@ -24,6 +24,7 @@ void TreeLines::reset(const ProcessTree& tree, std::span<const PlannedLine* cons
     l.line = &lines[i].impl();
     l.sign = tree.leaves()[i].sign;
     l.noise = tree.leaves()[i].noise;
+    l.lift = tree.leaves()[i].lift;
     l.twin = static_cast<int>(i);
     for (int j = l.twin - 1; j >= 0; --j) {
       const ProcessTree::Leaf &a = tree.leaves()[i], &b = tree.leaves()[j];
@@ -43,6 +44,7 @@ void TreeLines::reset(const ProcessTree& tree, std::span<const PlannedLine* cons
     l.mean_slope = plan.mean_lipschitz * speed;
     l.line->stretches.clear();
     l.line->hit_t = kInfinity;
+    l.line->hit_value = 0;
     l.line->shared = nullptr;
     l.line->geometry = geometry;
     l.line->plan = &plan;
@@ -117,7 +119,7 @@ void TreeLines::look_ahead(Leaf& l, double a, const LeafPoint& here) {
   // Right after a start the value and slope it was told may hold f off where the prior alone says
   // (B13).
   const double pull = n.begun ? n.path->pull(a) : l.plan->condition_pull;
-  const double threshold = l.plan->skip_threshold + l.plan->sigma_max * pull;
+  const double threshold = l.plan->skip_threshold + l.plan->sigma_max * pull + l.lift;
   if (!here.known || here.mean > threshold) {
     const double clear = l.mean->above_until(a, l.t_end, threshold);
     if (clear >= l.t_end) return certainly(positive, kInfinity);
@@ -133,6 +135,20 @@ void TreeLines::look_ahead(Leaf& l, double a, const LeafPoint& here) {
       [&](double t) { return -mean.value(geometry_.origin + geometry_.direction * t); },
       l.mean_slope, a, l.t_end, threshold);
   if (inside > a + least) certainly(-positive, inside);
+}
+
+TreeLines::Stretch TreeLines::certain(const ProcessTree& tree, int node) const {
+  const ProcessTree::Node& n = tree.nodes()[node];
+  if (n.kind == ProcessTree::Kind::leaf) return {leaves[n.leaf].certain, leaves[n.leaf].until};
+  const int dominant = n.kind == ProcessTree::Kind::least ? -1 : 1;
+  Stretch dominated{0, 0}, all{-dominant, kInfinity};
+  for (const int child : n.children) {
+    const Stretch s = certain(tree, child);
+    if (s.sign == dominant) dominated = {dominant, std::max(dominated.until, s.until)};
+    if (s.sign != -dominant) all.sign = 0;
+    all.until = std::min(all.until, s.until);
+  }
+  return dominated.sign != 0 ? dominated : all;
 }
 
 LeafPoint TreeLines::combine(const Leaf& l, double t, double g, double dg) {

@@ -60,7 +60,8 @@ class TreeLines {
     std::unique_ptr<FieldLine> mean, sigma;
     double t_begin = 0, t_end = 0;  // its bounds
     double smooth_step = kInfinity, mean_deviation = 0, mean_slope = kInfinity;
-    // Times its sign: certain without drawing until then; 0: not.
+    double lift = 0;  // of the tree's leaf
+    // Times its sign: farther than `lift` from 0 without drawing until then; 0: not for certain.
     int certain = 0;
     double until = -kInfinity;
     bool looked = false;
@@ -85,6 +86,12 @@ class TreeLines {
   double step_end(Leaf& leaf, double a) const;
   // Is the leaf certain at a, and how long? `here`: the leaf at a if it was evaluated.
   void look_ahead(Leaf& leaf, double a, const LeafPoint& here);
+  // A sign of F at a node that is certain until then, from the leaves that are; 0: it is not.
+  struct Stretch {
+    int sign;
+    double until;
+  };
+  Stretch certain(const ProcessTree& tree, int node) const;
 
   // f = μ + σ g, f' = μ' + gσ' + σ g' (math.md §2).
   LeafPoint combine(const Leaf& leaf, double t, double g, double dg);

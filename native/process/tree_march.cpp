@@ -33,7 +33,7 @@ bool TreeMarch::march(double t_end) {
     if (steps % kStepsToStop == kStepsToStop - 1 && stop && *stop) return false;
     for (std::size_t i = 0; i < lines_.leaves.size(); ++i)
       lines_.look_ahead(lines_.leaves[i], a, from_.leaf[i]);
-    const Stretch sure = certain(tree_->root());
+    const TreeLines::Stretch sure = lines_.certain(*tree_, tree_->root());
     if (sure.sign != 0) {
       // Inside for certain: the camera is, or bounds cut a subtracted leaf off.
       if (sure.sign < 0 && outside_) ++counters_->line_entry_inside;
@@ -58,21 +58,6 @@ bool TreeMarch::march(double t_end) {
   }
   ++counters_->line_step_limit;
   return false;
-}
-
-TreeMarch::Stretch TreeMarch::certain(int node) const {
-  const ProcessTree::Node& n = tree_->nodes()[node];
-  if (n.kind == ProcessTree::Kind::leaf)
-    return {lines_.leaves[n.leaf].certain, lines_.leaves[n.leaf].until};
-  const int dominant = n.kind == ProcessTree::Kind::least ? -1 : 1;
-  Stretch dominated{0, 0}, all{-dominant, kInfinity};
-  for (const int child : n.children) {
-    const Stretch s = certain(child);
-    if (s.sign == dominant) dominated = {dominant, std::max(dominated.until, s.until)};
-    if (s.sign != -dominant) all.sign = 0;
-    all.until = std::min(all.until, s.until);
-  }
-  return dominated.sign != 0 ? dominated : all;
 }
 
 // Evaluates the step from a to b_ as far as it takes to know the sign of F over it.

@@ -30,11 +30,6 @@ class TreeMarch {
   static constexpr int kStepsToStop = 1024;
   static constexpr int kMaxDepth = 64;
 
-  // A sign that is certain until then.
-  struct Stretch {
-    int sign;
-    double until;
-  };
   // Logarithms of P(above 0) and P(at or below 0).
   struct Odds {
     double above, below;
@@ -53,7 +48,6 @@ class TreeMarch {
 
   // tree_march.cpp
   bool march(double t_end);
-  Stretch certain(int node) const;
   int step_over(double a, double t_end);
   void advance();
   int sign_over(int leaf, std::vector<int>& signs, TreeSample& a, TreeSample& b);

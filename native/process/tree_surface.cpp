@@ -30,7 +30,7 @@ Box3 box_of(const ProcessTree& tree, int node, const std::vector<ProcessSurface>
 bool is_independent_union(const ProcessTree& tree) {
   if (tree.noises() < static_cast<int>(tree.leaves().size())) return false;
   for (const ProcessTree::Node& n : tree.nodes())
-    if (n.kind == ProcessTree::Kind::greatest) return false;
+    if (n.kind == ProcessTree::Kind::greatest || n.blend > 0) return false;
   for (const ProcessTree::Leaf& leaf : tree.leaves())
     if (leaf.sign < 0) return false;
   return true;
@@ -43,10 +43,6 @@ TreeSurface::TreeSurface(TreePtr tree, const Affine& object_to_world, Memory mem
     : tree_(std::move(tree)),
       inside_out_(ProcessTree::complement(*tree_)),
       independent_union_(is_independent_union(*tree_)) {
-  if (tree_->has_blends())
-    throw std::invalid_argument("the tree " + tree_->describe() +
-                                " has a smooth union, which is not marched: fit it "
-                                "(compose_and_fit) and render the fit.");
   const auto& leaves = tree_->leaves();
   for (std::size_t i = 0; i < leaves.size(); ++i) {
     try {
@@ -68,9 +64,8 @@ void TreeSurface::serve_inside() {
   if (tree_->is_single()) leaves_[0].serve_inside();
 }
 
-TreeHit TreeSurface::first_hit(TreeMarch& march, std::span<Line> lines, const Ray& ray,
-                               double t_max, std::span<const Start> starts, Rng& rng,
-                               Counters& counters) const {
+TreeHit TreeSurface::first_hit(March& march, std::span<Line> lines, const Ray& ray, double t_max,
+                               std::span<const Start> starts, Rng& rng, Counters& counters) const {
   if (tree_->is_single()) {
     const double t = leaves_[0].first_hit(lines[0], ray, t_max, starts[0], rng, counters);
     return {t, t < kInfinity ? 0 : -1};
@@ -102,7 +97,9 @@ TreeHit TreeSurface::first_hit(TreeMarch& march, std::span<Line> lines, const Ra
   keep(true);
   recall(true);
   const TreeHit hit =
-      march.first_hit(tree, plans_, geometry, lines, t_max, starts, kept, rng, counters);
+      tree.has_blends()
+          ? march.blended.first_hit(tree, plans_, geometry, lines, t_max, starts, rng, counters)
+          : march.hard.first_hit(tree, plans_, geometry, lines, t_max, starts, kept, rng, counters);
   keep(false);
   recall(false);
   return hit;
@@ -116,7 +113,10 @@ std::vector<std::pair<std::string, std::string>> TreeSurface::plan() const {
                     tree_->describe() + ", composed per realisation; noise " +
                         (shared ? "shared by some leaves" : "independent") +
                         (independent_union_ ? "; every leaf marched for itself, the first hit wins"
-                                            : "; leaves marched together"));
+                         : tree_->has_blends()
+                             ? "; leaves marched together, all that are within the blend radii of "
+                               "the surface (skipping is bounded by them)"
+                             : "; leaves marched together"));
   for (std::size_t i = 0; i < leaves_.size(); ++i)
     for (const auto& [key, text] : leaves_[i].plan())
       rows.emplace_back("leaf[" + std::to_string(i) + "]." + key, text);

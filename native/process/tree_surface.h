@@ -4,8 +4,8 @@
 // the first of theirs (definitions B5).
 #pragma once
 
+#include "process/blend_march.h"
 #include "process/surface.h"
-#include "process/tree_march.h"
 
 namespace gpis {
 
@@ -29,7 +29,11 @@ class TreeSurface {
   // The first t in (0, t_max) where F changes to F <= 0 (inside: to F >= 0), and the leaf it comes
   // from. `lines` and
   // `starts` hold one a leaf; lines hold the sample paths afterwards.
-  TreeHit first_hit(TreeMarch& march, std::span<Line> lines, const Ray& ray, double t_max,
+  struct March {
+    TreeMarch hard;
+    BlendMarch blended;
+  };
+  TreeHit first_hit(March& march, std::span<Line> lines, const Ray& ray, double t_max,
                     std::span<const Start> starts, Rng& rng, Counters& counters) const;
 
   std::vector<std::pair<std::string, std::string>> plan() const;

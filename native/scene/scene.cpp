@@ -126,9 +126,8 @@ void Scene::build_objects() {
       check_bounds(surface.bounds(), EntryPath("objects", i, o.name) + ".matrix");
       for (std::size_t k = 0; k < surface.leaves().size(); ++k) {
         const int material = o.materials[o.materials.size() == 1 ? 0 : k];
-        impl_->stochastic.push_back({surface.leaves()[k], impl_->materials[material].get(),
-                                     surface.sign(static_cast<int>(k)), o.albedo,
-                                     inverse(o.matrix)});
+        impl_->stochastic.push_back(
+            {surface.leaves()[k], impl_->materials[material].get(), o.albedo, inverse(o.matrix)});
       }
       continue;
     }

@@ -14,7 +14,6 @@ struct Scene::Impl {
   struct Stochastic {
     ProcessSurface surface;
     const Material* material;
-    double sign;           // gradients of the object are those of the leaf times this
     ColorFieldPtr albedo;  // none: its material's colour is the same everywhere
     Affine to_object;
   };

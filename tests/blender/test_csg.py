@@ -113,6 +113,45 @@ def test_order_toggle_solo(operands, describe):
     assert "GaussianProcess" in repr(entry_of(describe)[0]["process"])
 
 
+def test_drag(operands, extension):
+    """A row follows the mouse, is put back by Esc, and a drop is what the operator does by itself."""
+    a, b, c = operands
+    d = a.copy()
+    d.gpis_csg.items.clear()
+    build(a, ["UNION", "UNION"])
+    a.gpis_csg.items.add().object = d
+    items = a.gpis_csg.items
+    first, second, third = (item.object for item in items)
+    items[0].operation = "DIFFERENCE"
+    a.gpis_csg.active = 1
+
+    def order():
+        return [item.object for item in items]
+
+    drag = importlib.import_module(extension + ".csg.operators").Drag(a, 0, 500, 20)
+    assert not drag.follow(492) and drag.follow(485) and order() == [second, first, third]
+    assert drag.follow(300) and order() == [second, third, first] and a.gpis_csg.active == 2
+    assert items[2].operation == "DIFFERENCE"
+    assert drag.follow(900) and order() == [first, second, third]
+    drag.follow(460)
+    drag.put_back()
+    assert order() == [first, second, third] and a.gpis_csg.active == 1
+    assert bpy.ops.gpis.csg_drag(index=2, to=0) == {"FINISHED"}
+    assert order() == [third, first, second] and a.gpis_csg.active == 0
+    assert bpy.ops.gpis.csg_drag(index=1, to=1) == {"CANCELLED"}
+    with pytest.raises(RuntimeError, match="The list has no operand 7; it has 3"):
+        bpy.ops.gpis.csg_drag(index=7, to=0)
+
+
+def test_smooth_union_is_live(operands, describe):
+    a, b, c = operands
+    build(a, ["SMOOTH_UNION", "DIFFERENCE"])
+    a.gpis_csg.items[0].blend = 0.25
+    process = entry_of(describe)[0]["process"]
+    assert repr(process) == "<ProcessTree intersection(smooth_union(0, 1, blend=0.25), complement(2))>"
+    assert process.compose([0.1, 0.2, 9.0]) == pytest.approx(0.1 - 0.15**2 / 1.0)
+
+
 def test_lists_nest(operands, describe):
     a, b, c = operands
     b.gpis_csg.items.add().object = c
@@ -148,7 +187,6 @@ def test_shared_noise(operands, describe):
         (lambda a, b, c: setattr(b.gpis, "enabled", False), 'operand "B" of its CSG list is no GPIS'),
         (lambda a, b, c: setattr(b.gpis_csg.items.add(), "object", a), "leads back to itself"),
         (lambda a, b, c: setattr(b, "scale", (1, 0, 1)), '"B" is scaled to zero along an axis'),
-        (lambda a, b, c: setattr(a.gpis_csg.items[0], "operation", "SMOOTH_UNION"), "not rendered live: fit it"),
         (
             lambda a, b, c: (setattr(a.gpis_csg.items[0], "operation", "INTERSECTION"), setattr(b, "location", (9, 0, 0))),
             "the intersection is empty",
@@ -179,7 +217,7 @@ def test_fit(operands, describe, tmp_path):
     assert a.hide_render and not fitted.hide_render
     assert fitted.data.gpis_baked and fitted.material_slots[0].material == a.material_slots[0].material
     assert "realisations: standard error of the mean" in fitted.gpis_csg.quality
-    assert "Kolmogorov distance" in fitted.gpis_csg.quality
+    assert "Kolmogorov distance" in fitted.gpis_csg.quality and "not kept" not in fitted.gpis_csg.quality
     entry, warnings = entry_of(describe)
     assert not warnings
     points = np.random.default_rng(1).uniform(-1, 1, (50, 3))
@@ -203,6 +241,7 @@ def test_fit_of_a_smooth_union_in_closed_form_is_refused(operands):
         bpy.ops.gpis.csg_fit(resolution=16, method="CLOSED_FORM")
     assert len(bpy.data.objects) == before and not a.hide_render
     assert bpy.ops.gpis.csg_fit(resolution=16, realisations=50) == {"FINISHED"}
+    assert 'All of it has the material of "A"; those of other operands' in bpy.context.object.gpis_csg.quality
     assert bpy.ops.gpis.csg_fit.poll() is False  # the fit has no list
 
 

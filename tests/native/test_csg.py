@@ -5,7 +5,7 @@ from math import pi
 import gpis_native as gn
 import numpy as np
 import pytest
-from csg_leaves import BOUNDS, TREES, Leaf, X, a, normals, rays
+from csg_leaves import BOUNDS, TREES, Leaf, X, a, conditioned, draw, rays
 from statistics_checks import check_proportion, check_same_distribution
 
 pytestmark = pytest.mark.stats
@@ -14,13 +14,6 @@ pytestmark = pytest.mark.stats
 @pytest.fixture
 def n(full_size):
     return 60_000 if full_size else 10_000
-
-
-def draw(leaves, shared, n, rng):
-    """g of each leaf (n, points)."""
-    groups = shared if isinstance(shared, tuple) else [0] * len(leaves) if shared else range(len(leaves))
-    drawn = {}
-    return [drawn[k] if k in drawn else drawn.setdefault(k, leaf.noise(n, rng)) for k, leaf in zip(groups, leaves, strict=True)]
 
 
 def first_crossings(tree, leaves, g, rng):
@@ -85,17 +78,6 @@ def test_first_hits_of_explicit_realisations(name, n, seed):
     assert np.array_equal(hit, hits["part"] >= 0)
     assert hits["counters"]["line_step_limit"] == 0
     assert hits["counters"]["line_entry_inside"] < 1e-3 * m
-
-
-def conditioned(leaf, length_scale, n, rng, value, slope):
-    """g on the axis given value and, unless None, slope (n,) at x = 0; squared exponential."""
-    d = X / length_scale
-    k = np.exp(-(d**2) / 2)
-    covariance = leaf.covariance - np.outer(k, k) * (1 + np.outer(d, d) * (slope is not None))
-    g = normals(covariance, n, rng) + np.multiply.outer(value, k)
-    if slope is not None:
-        g += np.multiply.outer(slope * length_scale, d * k)
-    return g
 
 
 @pytest.mark.parametrize("memory", ["renewal", "renewal+", "none"])

@@ -13,7 +13,7 @@ SHARED = Path(__file__).parents[3] / "shared" / "data" / "gpis-light-transport"
 ENTRIES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
-def clark(m1, s1, m2, s2, r):
+def clark(m1, s1, m2, s2, r, cdf=cdf):
     """Mean and deviation of the least of two (Clark 1961, as math.md §10 has it for the greatest)."""
     nu = np.sqrt(s1**2 + s2**2 - 2 * r * s1 * s2)
     a = (m2 - m1) / nu
@@ -203,13 +203,29 @@ def test_length_scales_stay_within_the_grid():
     fit = gn.compose_and_fit([flat], "union", BOX, 5, 10, 1)
     assert fit["counters"]["length_scales_limited"] == 125
     lengths = np.sqrt(fit["anisotropy"][0, 0, 0, :3])
-    np.testing.assert_allclose(lengths, [0.5, 100 * np.sqrt(12), 0.5], rtol=1e-5)
+    np.testing.assert_allclose(lengths, [0.5, 4 * np.sqrt(12), 0.5], rtol=1e-5)
+
+
+def union_over_a_voxel(x, h):
+    """Mean and variance of the union of the two spheres at a point that is uniform in the voxel around x: Clark's formulas at
+    4 x 4 x 4 points of Gauss and Legendre."""
+    at, weight = np.polynomial.legendre.leggauss(4)
+    z = np.linspace(-9, 9, 18_001)
+    table = cdf(z)  # which takes its time
+    first = second = 0
+    for i in np.ndindex(4, 4, 4):
+        means = [np.linalg.norm(x + at[list(i)] * h / 2 - [c, 0.8, 0], axis=-1) - r for c, r in ((-0.4, 0.8), (0.4, 0.5))]
+        mean, sigma = clark(means[0], 0.1, means[1], 0.001, 0, lambda a: np.interp(a, z, table))
+        w = np.prod(weight[list(i)]) / 8
+        first, second = first + w * mean, second + w * (mean**2 + sigma**2)
+    return first, second - first**2
 
 
 @pytest.mark.stats
 @pytest.mark.parametrize("resolution", [32, 64])
 def test_two_spheres_of_the_paper(resolution, full_size, seed):
-    """The published voxels of the union of two stochastic spheres on the same nodes."""
+    """Issue 5, 2: the published voxels of the union of two stochastic spheres on the same nodes. They are moments over
+    points that are drawn anew in the voxel around each node."""
     path = SHARED / f"csg-two-spheres-eval-avg-{resolution}.vdb"
     if not path.exists():
         pytest.skip("the shared data files are not there")
@@ -217,23 +233,38 @@ def test_two_spheres_of_the_paper(resolution, full_size, seed):
     data = gn.read_vdb(path)
     size, h = resolution, 3 / resolution
     low = np.array([-1.5, -0.499, -1.5])
-    large, small = (
+    operands = [
         gn.GaussianProcess(gn.SphereField([x, 0.8, 0], r), s, SE(0.5)) for x, r, s in ((-0.4, 0.8, 0.1), (0.4, 0.5, 0.001))
-    )
-    fit = gn.compose_and_fit([large, small], "union", (low, low + h * (size - 1)), size, n, seed)
+    ]
+    query = operands, "union", (low, low + h * (size - 1)), size
+    fit, exact = gn.compose_and_fit(*query, n, seed), gn.compose_and_fit(*query, 2, method="closed_form")
     assert fit["mean"].shape == data["mean"].shape == (size,) * 3
-    published = data["variance"].astype(float)
-    noise = np.sqrt(published / 1000 + fit["mean_error"].astype(float) ** 2)
-    off = np.abs(fit["mean"] - data["mean"].astype(float))
-    x = nodes_of(fit)
-    means = [np.linalg.norm(x - [c, 0.8, 0], axis=-1) - r for c, r in ((-0.4, 0.8), (0.4, 0.5))]
-    # Within noise + 5e-3, but at the centres, where a distance has a tip that their jitter rounds off.
-    tip = np.minimum(means[0] + 0.8, means[1] + 0.5) < h
-    check_z(np.maximum(off - 5e-3, 0)[~tip], 0, noise[~tip])
-    wins = means[0] < means[1] - 0.4  # by four deviations
-    jitter = h**2 / 12  # |∇μ|² = 1 of a distance
-    relative = fit["sigma"][wins].astype(float) ** 2 / (published[wins] - jitter) - 1
-    # RMS within 5 %, beside the noise of theirs: √(2/1000) = 4.5 %. Nothing is drawn here, so ours has none.
-    assert np.sqrt(max(np.mean(relative**2) - 2 / 1000, 0)) < 0.05
-    assert abs(np.mean(relative)) < 0.01
+    published = {k: data[k].astype(float) for k in ("mean", "variance")}
+    of_voxel, variance_of_voxel = union_over_a_voxel(nodes_of(fit), h)
+
+    # The mean at every node within noise + 5e-3, as the issue asks, but where a voxel holds the centre of a sphere (6 and 8
+    # of them): a distance has a tip there, which their jitter rounds off by up to .024.
+    theirs, ours = np.sqrt(published["variance"] / 1000), fit["mean_error"].astype(float)
+    off = np.abs(fit["mean"] - published["mean"])
+    means = [np.linalg.norm(nodes_of(fit) - [c, 0.8, 0], axis=-1) - r for c, r in ((-0.4, 0.8), (0.4, 0.5))]
+    tips = np.minimum(means[0] + 0.8, means[1] + 0.5) < h
+    assert tips.sum() <= 8
+    check_z(np.maximum(off - 5e-3, 0)[~tips], 0, np.hypot(theirs, ours)[~tips])
+    # With the same jitter, at every node, and nothing but noise.
+    z = (published["mean"] - of_voxel) / theirs
+    assert np.sqrt(np.mean(z**2)) == pytest.approx(1, abs=0.03)
+    check_z(np.maximum(np.abs(published["mean"] - of_voxel) - 5e-3, 0), 0, theirs)
+
+    # The variance less the jitter term |grad mu|^2 h^2/12, RMS where the large sphere wins, drawn or not: within 5 %.
+    wins = means[0] < means[1]
+    slope = np.stack(np.gradient(exact["mean"].astype(float), h), axis=-1)
+    without_jitter = published["variance"] - np.sum(slope**2, axis=-1) * h**2 / 12
+    off = exact["sigma"][wins].astype(float) ** 2 / without_jitter[wins] - 1
+    assert np.sqrt(np.mean(off**2)) < 0.05  # of which 4.5 % are the noise of their 1,000 samples
+    assert abs(np.mean(off)) < 0.01
+    # A fit by n realisations is as far off, beside the noise that it states itself, to 10 %.
+    off = fit["sigma"][wins].astype(float) ** 2 / without_jitter[wins] - 1
+    own = 2 * fit["sigma_error"][wins] / fit["sigma"][wins]
+    assert np.sqrt(np.mean(off**2) - 1.1 * np.mean(own**2)) < 0.05
+    assert np.abs(published["variance"] / variance_of_voxel - 1)[wins].mean() < 0.04
     assert fit["counters"]["voxels_drawn"] < 0.65 * size**3

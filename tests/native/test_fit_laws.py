@@ -195,8 +195,8 @@ def test_bad_input_gets_a_sentence(change, sentence):
         gn.compose_and_fit(**(query | change))
 
 
-def test_renders_refuse_smooth_unions():
-    tree = gn.smooth_union(sphere(0, 1, 0.1), sphere(1, 1, 0.1), sphere(2, 1, 0.1), blend=0.2)
-    assert repr(tree) == "<ProcessTree smooth_union(smooth_union(0, 1, blend=0.2), 2, blend=0.2)>"
-    with pytest.raises(ValueError, match="has a smooth union, which is not marched: fit it"):
-        gn.first_hits(tree, [[0, 0, 3]], [[0, 0, -1]], 10)
+def test_operands_with_conditions_are_refused():
+    known = {"points": [[0, 0, 0.2]], "values": [0.1]}
+    with pytest.raises(ValueError, match="Operand 1 has conditions; a fit takes operands without"):
+        pinned = gn.GaussianProcess(0.1, 0.2, gn.SquaredExponential(0.5), conditions=known)
+        gn.compose_and_fit([sphere(0, 1, 0.1), pinned], "union", ((-1, -1, -1), (1, 1, 1)), 5, 10)

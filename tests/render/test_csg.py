@@ -26,6 +26,8 @@ TREES = {
     "difference": gn.difference(a, c),
     "nested": gn.difference(gn.union(a, b), c),
     "cut by a certain box": gn.difference(a, certain_box((0, 0.6, 0.6), (1, 1, 1))),
+    "smooth": gn.difference(gn.smooth_union(a, b, blend=0.3), c),
+    "smooth, shared": gn.smooth_union(ball(-0.5, 0.5, 0.1), ball(0.4, 0.5, 0.15), blend=0.4, shared_noise=True),
     "shared": gn.union(ball(-0.2, 0.7, 0.1), ball(0.3, 0.7, 0.15), shared_noise=True),
     "inside out": gn.intersection(certain_box((0, 0, 0), (2, 2, 2)), gn.complement(gn.union(a, c))),
 }
@@ -71,7 +73,7 @@ def test_furnace(name, material, memory, seed):
 
 @pytest.mark.stats
 @pytest.mark.parametrize("material", ["white", "mirror"])
-@pytest.mark.parametrize("name", ["nested", "shared"])
+@pytest.mark.parametrize("name", ["nested", "shared", "smooth", "smooth, shared"])
 def test_furnace_of_global(name, material, seed):
     """One realisation of every operand for the whole path: nothing is lost either, whatever the threads."""
     scene = gn.Scene(seen(TREES[name], [material], memory="global"))
@@ -86,9 +88,10 @@ def test_furnace_of_global(name, material, seed):
 @pytest.mark.stats
 @pytest.mark.parametrize("memory", MEMORIES)
 @pytest.mark.parametrize("material", ["white", "mirror"])
-def test_furnace_with_light_sampling(material, memory, seed):
+@pytest.mark.parametrize("name", ["nested", "smooth"])
+def test_furnace_with_light_sampling(name, material, memory, seed):
     world = {"image": np.ones((4, 8, 3))}
-    scene = gn.Scene(seen(TREES["nested"], [material], memory=memory, world=world))
+    scene = gn.Scene(seen(TREES[name], [material], memory=memory, world=world))
     result = gn.render(scene, 16, 16, samples=512, seed=seed)
     pixels, variance = (result.passes[p][..., 0].astype(float) for p in ("combined", "variance"))
     assert result.stats["shadow_rays"] > 10_000
