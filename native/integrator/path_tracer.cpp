@@ -233,8 +233,10 @@ bool PathTracer::Impl::closest(const Ray& ray, double t_max, Vertex& v) {
     v.inside = inside[v.body];
     v.material = scene.stochastic[v.surface].material;
     if (v.inside) v.material = &v.material->from_inside();
-    if (const auto& albedo = scene.stochastic[v.surface].albedo)
+    if (const auto& albedo = scene.stochastic[v.surface].albedo) {
+      ++counters->albedo_lookups;
       v.tint = albedo->value(scene.stochastic[v.surface].to_object.point(v.position));
+    }
     return true;
   }
   if (!hit_mesh) return false;
@@ -288,6 +290,7 @@ void PathTracer::Impl::remember_others(const Vertex& v) {
     for (std::size_t k = 0; k < tree.leaves().size(); ++k) {
       const std::size_t i = body.first + k;
       if (wrong) memory[i].reset();
+      counters->states_remembered += memory[i].has_value();
       const ProcessSurface& surface = scene.stochastic[i].surface;
       if (memory[i] && surface.memory() != Memory::renewal)
         memory[i] =
@@ -374,6 +377,7 @@ std::optional<ScatterSample> PathTracer::Impl::scatter_at(const Ray& ray, const 
     counters->line_normals += 2;
   }
   memory[v.surface] = surface.state(0, gradient * sign);
+  ++counters->states_remembered;
   normal = normalize(gradient) * (v.inside ? -1 : 1);
   if (v.material->specular() && !law.degenerate) {  // normals have a density to light them by
     const auto lit = [&](const auto& way) {
