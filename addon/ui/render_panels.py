@@ -104,9 +104,6 @@ class GPIS_PT_statistics(PropertiesPanel, bpy.types.Panel):
             _row(column, "Samples", f"{end['samples']} in {clock(end['seconds'])} (ended by: {entry['stop']})")
             if end["estimated_error"] is not None:
                 _row(column, "Error left", f"{100 * math.sqrt(end['estimated_error']):.2f} %")
-        for name, value in entry["stats"].items():
-            if value and not isinstance(value, (list, dict)):  # those are for the file
-                _row(column, name.replace("_", " "), _number(value))
         layout.operator("gpis.save_statistics", icon="EXPORT")
 
 
@@ -131,6 +128,24 @@ class GPIS_PT_error_plot(PropertiesPanel, bpy.types.Panel):
         slope = error_plot.slope(error_plot.points(history))
         if slope is not None:
             wrapped(column, context, f"Error falls as seconds to the power {slope:.2f}; the grey line is -0.50")
+
+
+class GPIS_PT_counts(PropertiesPanel, bpy.types.Panel):
+    """What the renderer did, in numbers that do not depend on the machine"""
+
+    bl_label = "Counts"
+    bl_parent_id = "GPIS_PT_statistics"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and statistics.last(context.scene.name) is not None
+
+    def content(self, layout, context):
+        column = layout.column(align=True)
+        for name, value in statistics.last(context.scene.name)["stats"].items():
+            if value and not isinstance(value, (list, dict)):  # those are for the file
+                _row(column, name.replace("_", " "), _number(value))
 
 
 class GPIS_PT_plan(PropertiesPanel, bpy.types.Panel):
@@ -216,6 +231,7 @@ _CLASSES = (
     GPIS_PT_film,
     GPIS_PT_statistics,
     GPIS_PT_error_plot,
+    GPIS_PT_counts,
     GPIS_PT_plan,
 )
 
