@@ -1,6 +1,7 @@
 """The render engine: takes a frame from Blender, lets a session render it, hands back pixels and sentences."""
 
 import logging
+from pathlib import Path
 
 import bpy
 
@@ -94,7 +95,7 @@ def render_frame(engine, depsgraph):
     if scene.gpis.write_statistics and not watched and session.stop != "cancelled":
         path = _beside_image(engine, scene, view_layer)
         if path is not None:
-            statistics.write(entry, path)
+            _write_beside(engine, entry, path)
 
 
 def _run(engine, session, view_layer, width, height):
@@ -156,6 +157,16 @@ def _beside_image(engine, scene, view_layer):
     if sum(layer.use for layer in scene.view_layers) > 1:
         path += f".{bpy.path.clean_name(view_layer.name)}"
     return path + ".json"
+
+
+def _write_beside(engine, entry, path):
+    """Never over a file that is not ours."""
+    place = statistics.free_place(path)
+    if place is not None:
+        statistics.write(entry, place)
+    if place != Path(path):
+        instead = f"are in {place.name}" if place is not None else "were not written"
+        engine.report({"WARNING"}, f"{path} is no file of GPIS and is kept: the statistics {instead}")
 
 
 def register():

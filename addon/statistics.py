@@ -4,6 +4,9 @@ import json
 import math
 from pathlib import Path
 
+# The first line of what this extension writes, after the brace: by it a file is known again.
+_MARK = {"written_by": "GPIS"}
+
 # Name of scene -> record of its last render. Plain values, never Blender's.
 _last = {}
 
@@ -11,7 +14,7 @@ _last = {}
 def record(scene_name, view_layer_name, frame, session, result, plan, warnings):
     """Keep and return the record of a render that is over."""
     height, width = result.passes["combined"].shape[:2]
-    entry = {
+    entry = _MARK | {
         "scene": scene_name,
         "view_layer": view_layer_name,
         "frame": frame,
@@ -58,6 +61,24 @@ def write(entry, path):
     with open(path, "w", encoding="utf-8") as file:
         json.dump(entry, file, indent=1, allow_nan=False)
         file.write("\n")
+
+
+def free_place(path):
+    """Where the statistics of a render go that nobody named a file for: `path`, or beside it what has .gpis in its name
+    where `path` is somebody else's file; None where both are."""
+    path = Path(path)
+    for place in (path, path.with_suffix(".gpis.json")):
+        if not place.exists() or _is_ours(place):
+            return place
+    return None
+
+
+def _is_ours(path):
+    if not path.is_file():
+        return False
+    beginning = json.dumps(_MARK, indent=1)[:-2].encode()
+    with open(path, "rb") as file:
+        return file.read(len(beginning)) == beginning
 
 
 def history_text(history):

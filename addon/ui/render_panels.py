@@ -3,12 +3,19 @@
 import math
 
 import bpy
+import bpy.utils.previews
 
-from .. import statistics
+from .. import error_plot, statistics
 from ..session import clock
 from .text import wrapped
 
 ENGINE = "GPIS"
+LEFT_OUT = "left out: "
+# Of the plot in a panel, in icons: one pixel of the picture is one of a screen without scaling.
+PLOT_SCALE = error_plot.SIZE / 20
+
+_previews = None
+_plotted = {}  # name of scene -> the history that its preview shows
 
 
 class PropertiesPanel:
@@ -97,10 +104,48 @@ class GPIS_PT_statistics(PropertiesPanel, bpy.types.Panel):
             _row(column, "Samples", f"{end['samples']} in {clock(end['seconds'])} (ended by: {entry['stop']})")
             if end["estimated_error"] is not None:
                 _row(column, "Error left", f"{100 * math.sqrt(end['estimated_error']):.2f} %")
-        for name, value in entry["stats"].items():
+        layout.operator("gpis.save_statistics", icon="EXPORT")
+
+
+class GPIS_PT_error_plot(PropertiesPanel, bpy.types.Panel):
+    """Estimated error against seconds, round by round, both axes logarithmic"""
+
+    bl_label = "Error against Time"
+    bl_parent_id = "GPIS_PT_statistics"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and statistics.last(context.scene.name) is not None
+
+    def draw(self, context):
+        history = statistics.last(context.scene.name)["history"]
+        icon = _plot_icon(context.scene.name, history)
+        column = self.layout.column()
+        if icon is None:
+            wrapped(column, context, "A curve takes two rounds whose error is known: more samples")
+            return
+        column.template_icon(icon, scale=PLOT_SCALE)
+        slope = error_plot.slope(error_plot.points(history))
+        if slope is not None:
+            wrapped(column, context, f"Error falls as seconds to the power {slope:.2f}; the grey line is -0.50")
+
+
+class GPIS_PT_counts(PropertiesPanel, bpy.types.Panel):
+    """What the renderer did, in numbers that do not depend on the machine"""
+
+    bl_label = "Counts"
+    bl_parent_id = "GPIS_PT_statistics"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and statistics.last(context.scene.name) is not None
+
+    def content(self, layout, context):
+        column = layout.column(align=True)
+        for name, value in statistics.last(context.scene.name)["stats"].items():
             if value and not isinstance(value, (list, dict)):  # those are for the file
                 _row(column, name.replace("_", " "), _number(value))
-        layout.operator("gpis.save_statistics", icon="EXPORT")
 
 
 class GPIS_PT_plan(PropertiesPanel, bpy.types.Panel):
@@ -115,11 +160,47 @@ class GPIS_PT_plan(PropertiesPanel, bpy.types.Panel):
         return super().poll(context) and statistics.last(context.scene.name) is not None
 
     def draw(self, context):
+        left_out = []
         for owner, rows in statistics.plan_by_owner(context.scene.name).items():
-            column = self.layout.column(align=True)
-            column.label(text=owner, icon="VOLUME_DATA" if owner.startswith("GPIS object") else "SCENE_DATA")
+            header, body = self.layout.panel(f"gpis_plan_{owner}", default_closed=owner.startswith(("Light", "Material")))
+            header.label(text=owner, icon=_icon_of(owner))
+            if body is None:
+                continue
+            column = body.column(align=True)
             for name, sentence in rows.items():
-                wrapped(column, context, f"{name.replace('_', ' ').capitalize()}: {sentence}", icon="BLANK1")
+                title = name.replace("_", " ").capitalize()
+                if sentence.startswith(LEFT_OUT):
+                    left_out.append(f"{title}: {sentence.removeprefix(LEFT_OUT)}")
+                else:
+                    wrapped(column, context, f"{title}: {sentence}", icon="DOT")
+            if left_out:
+                column.separator()
+                column.label(text="Left out", icon="X")
+                for line in left_out:
+                    wrapped(column, context, line, icon="BLANK1")
+                left_out = []
+
+
+def _plot_icon(scene_name, history):
+    """The icon of a scene's plot, drawn when its history is a new one; None where there is no curve yet."""
+    preview = _previews.get(scene_name)
+    if preview is None or _plotted.get(scene_name) is not history:
+        pixels = error_plot.picture(history)
+        if pixels is None:
+            return None
+        preview = preview or _previews.new(scene_name)
+        preview.image_size = preview.icon_size = (error_plot.SIZE, error_plot.SIZE)
+        preview.image_pixels_float.foreach_set(pixels.ravel())
+        preview.icon_pixels_float.foreach_set(pixels.ravel())
+        _plotted[scene_name] = history
+    return preview.icon_id
+
+
+def _icon_of(owner):
+    for start, icon in (("GPIS object", "VOLUME_DATA"), ("Object", "MESH_DATA"), ("Light", "LIGHT"), ("Material", "MATERIAL")):
+        if owner.startswith(start):
+            return icon
+    return "SCENE_DATA"
 
 
 def _switched(layout, owner, switch, name, text):
@@ -143,7 +224,27 @@ def _row(column, name, text):
     split.label(text=text)
 
 
-_CLASSES = (GPIS_PT_sampling, GPIS_PT_viewport, GPIS_PT_light_paths, GPIS_PT_film, GPIS_PT_statistics, GPIS_PT_plan)
+_CLASSES = (
+    GPIS_PT_sampling,
+    GPIS_PT_viewport,
+    GPIS_PT_light_paths,
+    GPIS_PT_film,
+    GPIS_PT_statistics,
+    GPIS_PT_error_plot,
+    GPIS_PT_counts,
+    GPIS_PT_plan,
+)
 
 
-register, unregister = bpy.utils.register_classes_factory(_CLASSES)
+def register():
+    global _previews
+    _previews = bpy.utils.previews.new()
+    for cls in _CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister():
+    for cls in reversed(_CLASSES):
+        bpy.utils.unregister_class(cls)
+    bpy.utils.previews.remove(_previews)
+    _plotted.clear()

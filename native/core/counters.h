@@ -34,6 +34,10 @@
   X(pivots_dropped, "rows left out of a covariance matrix: determined by the others")        \
   X(mean_lookups, "evaluations of a mean that is not constant")                              \
   X(sigma_lookups, "evaluations of a deviation that is not constant")                        \
+  X(tensor_lookups, "points on lines that took length scales A(x) which vary")               \
+  X(albedo_lookups, "evaluations of a painted albedo")                                       \
+  X(composed_rays, "rays through a body of several processes (CSG)")                         \
+  X(states_remembered, "states of processes kept where a path goes on from a surface")       \
   X(truncated_normals, "starts drawn conditioned on being outside")                          \
   X(nan_samples, "samples that were not finite: counted, logged and left out of the film")   \
   X(clamped_samples, "samples reduced by the clamp setting")

@@ -140,7 +140,6 @@ PathSample PathTracer::Impl::trace(const Ray& camera_ray, double t_max) {
   for (bounce = 0;; ++bounce) {
     Vertex v;
     const bool hit = closest(ray, bounce == 0 ? t_max : kInfinity, v);
-
     // Light that the ray meets on its way.
     result.radiance += throughput * (bounce == 0 ? scene.lights.met_by_camera(ray, v.t)
                                                  : scene.lights.met(ray, v.t, scatter_pdf));
@@ -150,7 +149,6 @@ PathSample PathTracer::Impl::trace(const Ray& camera_ray, double t_max) {
       break;
     }
     ++counters->path_vertices;
-
     // Scatter, and light the vertex from sampled lights.
     remember_others(v);
     keep_segments(v);
@@ -170,7 +168,6 @@ PathSample PathTracer::Impl::trace(const Ray& camera_ray, double t_max) {
       break;
     }
     throughput = throughput * next->weight;
-
     // Russian roulette, only on what has been lost: a lossless path is never ended.
     const double brightest = max_component(throughput);
     if (!(brightest > 0)) break;
@@ -217,9 +214,8 @@ bool PathTracer::Impl::closest(const Ray& ray, double t_max, Vertex& v) {
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const Scene::Impl::Body& body = scene.bodies[b];
     const auto [enter, leave] = clip(body.surface.bounds(), ray.origin, ray.direction, 0, nearest);
-    const bool meets = enter <= leave;
-    for (std::size_t k = 0; k < body.surface.leaves().size(); ++k) met[body.first + k] = meets;
-    if (!meets) continue;
+    for (std::size_t k = 0; k < body.surface.leaves().size(); ++k) met[body.first + k] = enter <= leave;
+    if (enter > leave) continue;
     const TreeHit hit =
         first_hit(body, inside[b], &lines[body.first], ray, nearest, memory, realisations, *rng);
     if (!(hit.t < nearest)) continue;
@@ -234,8 +230,10 @@ bool PathTracer::Impl::closest(const Ray& ray, double t_max, Vertex& v) {
     v.inside = inside[v.body];
     v.material = scene.stochastic[v.surface].material;
     if (v.inside) v.material = &v.material->from_inside();
-    if (const auto& albedo = scene.stochastic[v.surface].albedo)
+    if (const auto& albedo = scene.stochastic[v.surface].albedo) {
+      ++counters->albedo_lookups;
       v.tint = albedo->value(scene.stochastic[v.surface].to_object.point(v.position));
+    }
     return true;
   }
   if (!hit_mesh) return false;
@@ -289,6 +287,7 @@ void PathTracer::Impl::remember_others(const Vertex& v) {
     for (std::size_t k = 0; k < tree.leaves().size(); ++k) {
       const std::size_t i = body.first + k;
       if (wrong) memory[i].reset();
+      counters->states_remembered += memory[i].has_value();
       const ProcessSurface& surface = scene.stochastic[i].surface;
       if (memory[i] && surface.memory() != Memory::renewal)
         memory[i] =
@@ -374,6 +373,7 @@ std::optional<ScatterSample> PathTracer::Impl::scatter_at(const Ray& ray, const 
     counters->line_normals += 2;
   }
   found.remember(gradient, here(memory));
+  ++counters->states_remembered;
   normal = normalize(gradient) * (v.inside ? -1 : 1);
   if (v.material->specular() && !law.degenerate) {  // normals have a density to light them by
     const auto lit = [&](const auto& way) {

@@ -89,6 +89,7 @@ void JointDensePath::draw(long index, Rng& rng, Counters& counters) {
   }
   reach(anchor_ + index * step_, counters);
   const LocalPoint p = point(anchor_ + index * step_);
+  counters.tensor_lookups += !covariance_->stationary();
   const double g = rows_.add_free(p, value_row(), rng, counters, kJitter);
   points_.push_back({index, g, rows_.add_free(p, slope_row(), rng, counters, kJitter)});
 }

@@ -40,6 +40,7 @@ void JointLine::begin(const Plan& plan, const LineGeometry& line, double anchor,
   rebased_ = false;
   lasting_rows_ = rows_.count();
   if (covariance_->anisotropy()) {
+    ++counters.tensor_lookups;
     rows_.begin_line(line_);
     on_line_at_anchor_ = rows_.line().at(anchor, at_anchor_);
   }

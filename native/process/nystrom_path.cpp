@@ -157,6 +157,7 @@ void NystromPath::draw(Node& at, Rng& rng, Counters& counters) {
   const bool value_is_enough = varies() && alone();
   const LocalPoint local = value_is_enough ? rows_.line().local(at.at) : point(at.t);
   const LinePoint* on_line = varies() ? &at.at : nullptr;
+  counters.tensor_lookups += varies();
   at.g = rows_.add_free(local, value_row(), rng, counters, 0, on_line);
   at.dg = rows_.add_free(local, slope_row(), rng, counters, 0, on_line);
 }

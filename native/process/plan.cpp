@@ -15,7 +15,9 @@
 namespace gpis {
 namespace {
 
-// A march ends a line after some million steps (process/march.h) and counts it.
+// A march ends a line after this many steps (kMaxSteps of process/march.h) and counts it, some
+// four of them a length scale.
+constexpr double kMostSteps = 1 << 20;
 constexpr double kTooManySteps = 1e6;
 
 // The same f with a kernel of unit variance: the weight of a kernel multiplies σ² (definitions E9).
@@ -118,6 +120,27 @@ Box3 intersection(const Box3& a, const Box3& b) {
   return r;
 }
 
+// Where mean and deviation are constant, Rice's rate (oracle 2) says how many rays get as far as
+// the march does, and how many of these would have met the surface behind: more of them than roots
+// may be missed would end in the middle of the process without a word.
+void check_steps(const PlannedLine& plan, const Range& mean, const Range& sigma,
+                 double missed_root) {
+  if (!(plan.steps > kMostSteps) || mean.min != mean.max || sigma.min != sigma.max ||
+      sigma.min == 0 || mean.min > plan.skip_threshold)
+    return;
+  const double level = mean.min / sigma.min;
+  const double rate = std::exp(-0.5 * level * std::max(level, 0.0)) / (2 * kPi);  // a length scale
+  const double marched = kMostSteps / 4, behind = plan.steps / 4 - marched;
+  const double missed = std::exp(-rate * marched) * -std::expm1(-rate * behind);
+  if (missed <= missed_root) return;
+  refuse(
+      "The mean of ", level,
+      " standard deviations is rarely met and nowhere certain, and the bounds are ",
+      static_cast<long>(plan.steps / 4), " length scales across: a ray may take more than the ",
+      static_cast<long>(kMostSteps),
+      " steps that are the most. Take a longer length_scale, smaller bounds, or a smaller mean.");
+}
+
 }  // namespace
 
 std::shared_ptr<const GaussianProcess> inside_out(const GaussianProcess& process) {
@@ -179,6 +202,7 @@ PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Memory mem
   // A certain surface (σ = 0) still needs a last step across it: stop a little before the root.
   const double scale = std::min(shortest, std::isfinite(diagonal) ? diagonal : 1.0);
   plan.skip_threshold = std::max(plan.skip_deviations * sigma.max, 1e-4 * scale);
+  check_steps(plan, mean, sigma, missed_root);
   // A ray meets the surface about a deviation behind the place where it may first be, unless it
   // starts behind that.
   const double slope = process->mean->lipschitz();

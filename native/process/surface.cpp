@@ -4,6 +4,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "process/conditions.h"
 #include "process/joint_line.h"
 #include "process/line_impl.h"
 #include "process/plan.h"
@@ -34,27 +35,6 @@ Sampler sampler_for(Memory memory, Sampler sampler) {
   return Sampler::realisation;
 }
 
-// The march ends a line after 2^20 steps (process/march.h), some four of them a length scale. Where
-// mean and deviation are constant, Rice's rate (oracle 2) says how many rays get so far: more of
-// them than roots may be missed would end in the middle of the process without a word.
-void check_steps(const PlannedLine& plan, double missed_root) {
-  const Range mean = plan.process->mean->range(), sigma = plan.process->sigma->range();
-  constexpr double kSteps = 1 << 20;
-  if (!(plan.steps > kSteps) || mean.min != mean.max || sigma.min != sigma.max || sigma.min == 0 ||
-      mean.min > plan.skip_threshold)
-    return;
-  const double level = mean.min / sigma.min, lengths = kSteps / 4;
-  const double rate = std::exp(-0.5 * level * std::max(level, 0.0)) / (2 * kPi);  // a length scale
-  if (std::exp(-rate * lengths) <= missed_root) return;
-  throw std::invalid_argument(
-      "The mean of " + std::to_string(level) +
-      " standard deviations is rarely met and nowhere certain, and the bounds are " +
-      std::to_string(static_cast<long>(plan.steps / 4)) +
-      " length scales across: a ray may take more than the " +
-      std::to_string(static_cast<long>(kSteps)) +
-      " steps that are the most. Take a longer length_scale, smaller bounds, or a smaller mean.");
-}
-
 }  // namespace
 
 ProcessSurface::ProcessSurface(std::shared_ptr<const GaussianProcess> process,
@@ -66,7 +46,6 @@ ProcessSurface::ProcessSurface(std::shared_ptr<const GaussianProcess> process,
       missed_root_(missed_root),
       planned_(std::make_shared<PlannedLine>(
           plan_line(std::move(process), memory, sampler_, missed_root))) {
-  check_steps(*planned_, missed_root);
   const double volume = determinant(object_to_world.linear);
   if (!std::isfinite(volume) || std::abs(volume) < 1e-300)
     throw std::invalid_argument(
@@ -249,14 +228,25 @@ std::vector<std::pair<std::string, std::string>> ProcessSurface::plan() const {
                                ": the last segments on which the process was drawn";
   const char* memories[] = {"none", "renewal", "renewal+", segments.c_str(),
                             "global: one realisation for the whole path and its shadow rays"};
-  const Range sigma = planned_->process->sigma->range();
+  const GaussianProcess& process = *planned_->process;
+  const auto range = [&](const Range& r) {
+    return r.min == r.max ? "constant " + number(r.min)
+                          : "varies, " + number(r.min) + " to " + number(r.max);
+  };
+  const auto lengths = [&] {
+    const std::string kernel = process.kernel->describe();
+    if (!process.anisotropy) return "the same everywhere (A(x) left out): " + kernel;
+    const Range a = process.anisotropy->eigenvalues();
+    return "A(x) varies, lengths within " + number(std::sqrt(a.min)) + " and " +
+           number(std::sqrt(a.max)) + ", times those of " + kernel;
+  };
   std::vector<std::pair<std::string, std::string>> facts = {
       {"sampler", planned_->sampler_reason},
       {"correlation_error", number(planned_->line_sampler->correlation_error())},
       {"memory", memories[memory_.kind]},
-      {"sigma", sigma.min == sigma.max
-                    ? "constant " + number(sigma.min)
-                    : "varies, " + number(sigma.min) + " to " + number(sigma.max)},
+      {"mean", range(process.mean->range())},
+      {"sigma", range(process.sigma->range())},
+      {"length_scales", lengths()},
       {"certainly_absent", "where the mean exceeds " + number(planned_->skip_threshold) + " (" +
                                number(planned_->skip_deviations) +
                                " standard deviations): nothing is drawn"}};
@@ -267,6 +257,11 @@ std::vector<std::pair<std::string, std::string>> ProcessSurface::plan() const {
                            " values and slopes in " + std::to_string(posterior->blocks()) +
                            " blocks, solved with a truncation error of " +
                            number(posterior->truncation_error()) + " standard deviations"});
+  else
+    facts.emplace_back("conditions", process.conditions
+                                         ? std::to_string(process.conditions->points.size()) +
+                                               " points, in the realisation itself"
+                                         : "left out: no condition points");
   if (planned_->process->time)
     facts.push_back(
         {"time", "now " + number(*planned_->process->time) +

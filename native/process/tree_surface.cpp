@@ -70,6 +70,7 @@ TreeHit TreeSurface::first_hit(March& march, std::span<Line> lines, const Ray& r
     const double t = leaves_[0].first_hit(lines[0], ray, t_max, starts[0], rng, counters);
     return {t, t < kInfinity ? 0 : -1};
   }
+  ++counters.composed_rays;
   if (independent_union_ && !starts[0].inside) {
     // Outside of the union is outside of every leaf, and the leaves know nothing of each other.
     TreeHit first;

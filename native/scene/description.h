@@ -46,6 +46,8 @@ struct WorldDescription {
   std::vector<float> image;
   Mat3 matrix;  // image space -> world, a rotation (a reflection is allowed)
   double strength = 1;
+
+  bool black() const { return strength == 0 || (image.empty() && max_component(color) == 0); }
 };
 
 struct LightDescription {

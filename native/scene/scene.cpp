@@ -52,10 +52,6 @@ std::unique_ptr<Light> make_world(const WorldDescription& w) {
                                 w.strength);
 }
 
-bool is_black(const WorldDescription& w) {
-  return w.strength == 0 || (w.image.empty() && max_component(w.color) == 0);
-}
-
 void check_bounds(const Box3& bounds, const std::string& path) {
   for (int i = 0; i < 3; ++i)
     for (const double end : {std::abs(bounds.min[i]), std::abs(bounds.max[i])})
@@ -92,7 +88,7 @@ Scene::Scene(SceneDescription description)
   if (impl_->triangles) impl_->triangles->commit();
   impl_->radius = bounding_radius(*impl_);
   for (const LightDescription& l : d.lights) impl_->lights.add(make_light(l), l.visible_to_camera);
-  if (!is_black(d.world)) impl_->lights.add(make_world(d.world), true);
+  if (!d.world.black()) impl_->lights.add(make_world(d.world), true);
   impl_->lights.finish(impl_->radius, d.settings.light_sampling);
 }
 
@@ -143,65 +139,6 @@ void Scene::build_objects() {
     std::vector<const Material*>& slots = impl_->instance_materials.emplace_back();
     for (const int m : o.materials) slots.push_back(impl_->materials[m].get());
   }
-}
-
-std::vector<std::pair<std::string, std::string>> Scene::plan() const {
-  const SceneDescription& d = description_;
-  std::vector<std::pair<std::string, std::string>> rows;
-  rows.emplace_back("scene.embree",
-                    impl_->triangles
-                        ? std::to_string(impl_->instance_materials.size()) + " mesh objects"
-                        : "left out: no meshes");
-  rows.emplace_back(
-      "scene.light_sampling",
-      impl_->lights.groups() > 0
-          ? "on: " + std::to_string(impl_->lights.groups()) +
-                " shadow rays at every surface that is not a deterministic mirror or glass"
-      : d.settings.light_sampling
-          ? "left out: nothing to sample (a constant world is met by following the BRDF)"
-          : "off by settings.light_sampling");
-  std::size_t transparent = 0;
-  for (const auto& b : impl_->bodies)
-    transparent += impl_->stochastic[b.first].material->relative_index() != 0;
-  rows.emplace_back("scene.inside", transparent
-                                        ? "rays travel inside of " + std::to_string(transparent) +
-                                              " dielectric bodies, each a medium in air"
-                                        : "left out: no body is a dielectric");
-  rows.emplace_back("scene.world", is_black(d.world)       ? "left out: black"
-                                   : d.world.image.empty() ? "constant colour"
-                                                           : "image, sampled by brightness");
-  rows.emplace_back("scene.bounces", d.settings.max_bounces
-                                         ? "at most " + std::to_string(*d.settings.max_bounces)
-                                         : "unlimited, Russian roulette below throughput 1");
-  for (std::size_t i = 0; i < d.lights.size(); ++i)
-    rows.emplace_back("lights[" + std::to_string(i) + "].probability",
-                      std::to_string(impl_->lights.probability(i)));
-  for (std::size_t i = 0; i < d.materials.size(); ++i) {
-    const MaterialDescription& m = d.materials[i];
-    const bool smooth = m.roughness < kSmoothRoughness;
-    std::string row;
-    if (m.type == MaterialDescription::Type::conductor)
-      row = smooth ? "mirror: roughness below .01" : "single-scatter GGX, alpha = roughness²";
-    if (m.type == MaterialDescription::Type::principled)
-      row = smooth && m.metallic == 1 ? "mirror (Schlick): metallic 1, roughness below .01"
-                                      : std::string(
-                                            "Lambert under a dielectric coat (index 1.5) mixed "
-                                            "with a metal, single-scatter GGX") +
-                                            (smooth ? ", roughness raised to .01" : "");
-    if (m.type == MaterialDescription::Type::dielectric)
-      row = smooth ? "smooth dielectric: exact Fresnel"
-                   : "dielectric: single-scatter GGX, alpha = roughness²";
-    if (!row.empty()) rows.emplace_back("materials[" + std::to_string(i) + "].model", row);
-  }
-  for (std::size_t i = 0; i < d.objects.size(); ++i)
-    if (d.objects[i].albedo)
-      rows.emplace_back(EntryPath("objects", i, d.objects[i].name) + ".albedo",
-                        "a field: looked up where a ray meets the surface");
-  for (const auto& b : impl_->bodies)
-    for (const auto& [key, value] : b.surface.plan())
-      rows.emplace_back(EntryPath("objects", b.object, d.objects[b.object].name) + ("." + key),
-                        value);
-  return rows;
 }
 
 }  // namespace gpis

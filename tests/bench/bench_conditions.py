@@ -34,7 +34,9 @@ def bench_conditions():
             begin = time.process_time()
             counters = gn.first_hits(gp, *camera_rays(n, rng), 10, threads=1)["counters"]
             spent = time.process_time() - begin
-            stated = re.search(r"in (\d+) blocks.*error of (\S+)", gp.plan().get("conditions", "in 0 blocks, error of 0 "))
+            stated = re.search(
+                r"in (\d+) blocks.*error of (\S+)", gp.plan()["conditions"] if points else "in 0 blocks, error of 0 "
+            )
             rows.append(
                 {
                     "points": points,

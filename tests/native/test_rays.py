@@ -242,3 +242,30 @@ def test_the_plan_warns_of_lines_that_take_long():
     warning = gn.GaussianProcess(1.0, 0.1, gn.SquaredExponential(1e-6), bounds=bounds).plan()["warning"]
     assert "longer length_scale or smaller bounds" in warning
     assert "warning" not in gn.GaussianProcess(1.0, 0.1, gn.SquaredExponential(1e-3), bounds=bounds).plan()
+
+
+def test_endless_lines_are_refused_where_they_would_lose_roots():
+    """A constant mean on n length scales, of which a march takes 2^18: refused where more rays than roots may be missed
+    end there and would have met the surface behind; by Rice's rate exp(-z²/2)/2π a length scale."""
+
+    def planned(level, lengths):
+        side = lengths / sqrt(3)
+        return gn.GaussianProcess(level, 1, gn.SquaredExponential(1.0), bounds=((0, 0, 0), (side,) * 3)).plan()
+
+    def lost(level, lengths):
+        rate = np.exp(-(level**2) / 2) / (2 * np.pi)
+        return np.exp(-rate * 2**18) * -np.expm1(-rate * (lengths - 2**18))
+
+    outcomes = {}
+    for lengths in (3e5, 5e5, 5e6):
+        for level in (3.5, 4.1, 4.2, 5.0, 5.5, 6.1, 6.2, 6.3, 6.6):
+            try:
+                plan, refused = planned(level, lengths), False
+            except ValueError as error:
+                assert "rarely met and nowhere certain" in str(error)
+                refused = True
+            certain = not refused and level > float(plan["certainly_absent"].split("exceeds ")[1].split()[0])
+            assert refused == (not certain and lost(level, lengths) > 1e-3), (level, lengths)
+            outcomes[level, lengths] = refused
+    # Of 5e5 length scales at 6.1 deviations one ray in 3,000 loses its root.
+    assert outcomes[5.0, 5e5] and outcomes[5.5, 5e5] and not outcomes[6.1, 5e5] and not outcomes[3.5, 5e6]

@@ -6,45 +6,7 @@ import sys
 import gpis_native as gn
 import numpy as np
 import pytest
-
-CONDITIONS = {"points": [(0, 0, 1)], "values": [0.0]}
-LAMP = {"type": "point", "name": "Lamp", "color": (1, 1, 1), "power": 100.0, "matrix": np.eye(4) + 3 * np.eye(4, k=1)}
-TRIANGLE = {"vertices": np.array([(-1, -1, 2.0), (1, -1, 2), (0, 1, 2)]), "triangles": np.array([(0, 1, 2)])}
-
-
-def ball(sigma=0.05, center=(0, 0, 0), **more):
-    reach = 1.4
-    bounds = (np.subtract(center, reach), np.add(center, reach))
-    return gn.GaussianProcess(gn.SphereField(center, 1), sigma, gn.SquaredExponential(0.2), bounds=bounds, **more)
-
-
-def scene(process=None, *, lights=(), mesh=False, material=None, **settings):
-    """A random ball, and a triangle in front of it where `mesh` says so, seen from (0, 0, 4) under a grey sky."""
-    eye = np.eye(4)
-    eye[2, 3] = 4
-    objects = [{"name": "Ball", "type": "gpis", "process": process or ball(), "materials": ["Body"]}]
-    if mesh:
-        objects.append({"name": "Sheet", "type": "mesh", "mesh": "Sheet", "materials": ["Body"]})
-    return {
-        "version": 1,
-        "settings": settings,
-        "camera": {"type": "perspective", "matrix": eye, "fov_x": 0.6},
-        "world": {"color": (0.5, 0.5, 0.5)},
-        "lights": list(lights),
-        "materials": {"Body": material or {"type": "lambert", "color": (0.8, 0.8, 0.8)}},
-        "meshes": {"Sheet": TRIANGLE} if mesh else {},
-        "objects": objects,
-    }
-
-
-def counted(description, seed):
-    stats = gn.render(gn.Scene(description), 12, 12, samples=16, seed=seed, threads=1).stats
-    return {name: count for name, count in stats.items() if isinstance(count, int)}
-
-
-def varying():
-    return gn.GridField(np.linspace(0.04, 0.06, 8).reshape(2, 2, 2), 3.0, (-1.5, -1.5, -1.5))
-
+from scene_parts import CONDITIONS, LAMP, TRIANGLE, ball, combed, counted, painted, scene, varying
 
 ROWS = {
     "mesh_rays": lambda: scene(mesh=True),
@@ -52,6 +14,9 @@ ROWS = {
     "sigma_lookups": lambda: scene(ball(varying())),
     "condition_rows": lambda: scene(ball(conditions=CONDITIONS)),
     "inside_rays": lambda: scene(material={"type": "dielectric", "ior": 1.5}, max_bounces=8),
+    "tensor_lookups": lambda: scene(combed()),
+    "albedo_lookups": lambda: painted(scene()),
+    "composed_rays": lambda: scene(gn.difference(ball(), ball(center=(0, 0, 1)))),
     "clamped_samples": lambda: scene(clamp=0.1),
 }
 
@@ -65,12 +30,12 @@ def test_what_is_left_out_is_not_entered(counter, seed):
 def test_embree_is_not_opened_without_meshes():
     """In a process of its own: a library once opened stays."""
     code = (
-        "import sys; sys.path.insert(0, sys.argv[1]); import gpis_native as gn; from test_left_out import scene\n"
+        "import sys; sys.path.insert(0, sys.argv[1]); import gpis_native as gn; from scene_parts import scene\n"
         "opened = lambda: any('libembree' in line for line in open('/proc/self/maps'))\n"
         "gn.render(gn.Scene(scene()), 4, 4, samples=16); print(opened())\n"
         "gn.render(gn.Scene(scene(mesh=True)), 4, 4, samples=16); print(opened())\n"
     )
-    folder = __file__.rsplit("/", 1)[0]
+    folder = __file__.rsplit("/", 2)[0]
     run = subprocess.run([sys.executable, "-c", code, folder], capture_output=True, text=True, check=True)
     assert run.stdout.split() == ["False", "True"]
 
@@ -85,15 +50,69 @@ def test_certainly_absent_evaluates_no_process(seed):
     assert counted(scene(), seed)["line_evaluations"] > 0
 
 
-def unused():
+def test_certainly_solid_evaluates_no_process(seed):
+    """Rays inside a body whose mean is 200 deviations below the surface, as those of a dielectric, and inside a thin one."""
+    counters = []
+    for mean in (-10, -0.05):
+        solid = gn.GaussianProcess(gn.ConstantField(mean), 0.05, gn.SquaredExponential(0.2), bounds=((-1,) * 3, (1,) * 3))
+        rays = (np.zeros((64, 3)), np.tile([0.0, 0.0, 1.0], (64, 1)))
+        hits = gn.first_hits(solid, *rays, 10, inside=np.ones(64, bool), seed=seed)
+        counters.append(hits["counters"])
+        assert np.isinf(hits["t"]).all() == (mean == -10)
+    certain, drawn = counters
+    for name in ("line_segments", "line_evaluations", "line_normals", "truncated_normals"):
+        assert certain[name] == 0 < drawn[name], name
+    assert certain["line_skipped"] == 64
+
+
+def room(bounces):
+    """Haze of two deviations all over a closed room: every path meets something, with the haze drawn up to there."""
+    corners = 2.0 * np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    box = {"vertices": corners, "triangles": np.array([t for a, b, c, d in sides for t in ((a, b, c), (a, c, d))])}
+    haze = gn.GaussianProcess(gn.ConstantField(0.1), 0.05, gn.SquaredExponential(0.5), bounds=((-2.5,) * 3, (2.5,) * 3))
+    description = scene(haze, mesh=True, max_bounces=bounces)
+    description["camera"]["matrix"] = np.eye(4)
+    return description | {"meshes": {"Sheet": box}}
+
+
+def test_the_last_bounce_keeps_no_memory(seed):
+    """A path of n bounces meets n + 2 surfaces; the last one only gives its light, and of the processes nothing is kept."""
+    paths = 12 * 12 * 16
+    for bounces in (0, 1):
+        stats = counted(room(bounces), seed)
+        assert stats["path_vertices"] == (bounces + 1) * paths
+        # Where the haze itself is met its state is that of the hit; on a wall it is what was drawn up to there, save the
+        # few rays that start at the surface and are found inside behind a missed root.
+        assert stats["states_remembered"] == stats["path_vertices"] - stats["states_inside"]
+
+
+def unused(folder):
     plain = scene(lights=[LAMP])
+    apart = plain | {"objects": plain["objects"] + [plain["objects"][0] | {"name": "Apart", "process": ball(center=(0, 0, -3000))}]}
+    axis = np.linspace(-1.5, 1.5, 13)
+    mean = np.linalg.norm(np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1), axis=-1) - 1
+    grids = {"mean": mean, "origin": (-1.5,) * 3, "voxel_size": 0.25}
+    gn.write_vdb(str(folder / "lean.vdb"), grids)
+    gn.write_vdb(str(folder / "rich.vdb"), grids | {"sigma": 0.1 + 0 * mean, "anisotropy": np.ones((13, 13, 13, 6))})
+    of_grid = [
+        scene(gn.GaussianProcess(gn.VdbField(str(folder / name), "mean"), 0.05, gn.SquaredExponential(0.2)), lights=[LAMP])
+        for name in ("lean.vdb", "rich.vdb")
+    ]
     dark = plain | {"lights": [LAMP, LAMP | {"name": "Off", "power": 0.0}]}
     mesh = plain | {"meshes": {"Unused": TRIANGLE}}
     material = plain | {"materials": plain["materials"] | {"Unused": {"type": "mirror", "color": (1, 1, 1)}}}
-    return {"light": (plain, dark), "mesh": (plain, mesh), "material": (plain, material)}
+    return {
+        "light": (plain, dark),
+        "mesh": (plain, mesh),
+        "material": (plain, material),
+        "object": (plain, apart),
+        "grid": of_grid,
+    }
 
 
-@pytest.mark.parametrize("kind", ["light", "mesh", "material"])
-def test_what_is_not_used_changes_no_counter(kind, seed):
-    plain, more = unused()[kind]
+@pytest.mark.parametrize("kind", ["light", "mesh", "material", "object", "grid"])
+def test_what_is_not_used_changes_no_counter(kind, seed, tmp_path):
+    plain, more = unused(tmp_path)[kind]
+    assert counted(plain, seed)["line_evaluations"] > 0
     assert counted(plain, seed) == counted(more, seed)
