@@ -214,7 +214,8 @@ bool PathTracer::Impl::closest(const Ray& ray, double t_max, Vertex& v) {
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const Scene::Impl::Body& body = scene.bodies[b];
     const auto [enter, leave] = clip(body.surface.bounds(), ray.origin, ray.direction, 0, nearest);
-    for (std::size_t k = 0; k < body.surface.leaves().size(); ++k) met[body.first + k] = enter <= leave;
+    for (std::size_t k = 0; k < body.surface.leaves().size(); ++k)
+      met[body.first + k] = enter <= leave;
     if (enter > leave) continue;
     const TreeHit hit =
         first_hit(body, inside[b], &lines[body.first], ray, nearest, memory, realisations, *rng);
