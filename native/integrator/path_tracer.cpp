@@ -113,7 +113,6 @@ PathTracer::PathTracer(const Scene& scene, const std::atomic<bool>* stop)
   for (Line& line : impl_->shadow_lines) line.stop_when(stop);
 }
 PathTracer::~PathTracer() = default;
-
 PathSample PathTracer::trace(const Ray& camera_ray, double t_max, const BlockPoints& points,
                              Rng& rng, Counters& counters) {
   impl_->points = &points;
