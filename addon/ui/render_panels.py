@@ -100,8 +100,11 @@ class GPIS_PT_statistics(PropertiesPanel, bpy.types.Panel):
         column = layout.column(align=True)
         if entry["history"]:
             end = entry["history"][-1]
-            _row(column, "Frame", f"{entry['frame']}, {entry['view_layer']}, {entry['width']} × {entry['height']}")
-            _row(column, "Samples", f"{end['samples']} in {clock(end['seconds'])} (ended by: {entry['stop']})")
+            _row(column, "Frame", f"{entry['frame']}, {entry['view_layer']}")
+            _row(column, "Size", f"{entry['width']} × {entry['height']}")
+            _row(column, "Samples", f"{end['samples']:g}")
+            _row(column, "Time", clock(end["seconds"]))
+            _row(column, "Ended by", entry["stop"])
             if end["estimated_error"] is not None:
                 _row(column, "Error left", f"{100 * math.sqrt(end['estimated_error']):.2f} %")
         layout.operator("gpis.save_statistics", icon="EXPORT")

@@ -262,9 +262,11 @@ def test_two_spheres_of_the_paper(resolution, full_size, seed):
     off = exact["sigma"][wins].astype(float) ** 2 / without_jitter[wins] - 1
     assert np.sqrt(np.mean(off**2)) < 0.05  # of which 4.5 % are the noise of their 1,000 samples
     assert abs(np.mean(off)) < 0.01
-    # A fit by n realisations is as far off, beside the noise that it states itself, to 10 %.
-    off = fit["sigma"][wins].astype(float) ** 2 / without_jitter[wins] - 1
-    own = 2 * fit["sigma_error"][wins] / fit["sigma"][wins]
-    assert np.sqrt(np.mean(off**2) - 1.1 * np.mean(own**2)) < 0.05
+    # A fit by n realisations differs from that by the noise that it states itself (none where nothing was drawn). Some
+    # hundred of its voxels are independent.
+    drawn = wins & (fit["sigma_error"] > 0)
+    ours, noise = (fit[name][drawn].astype(float) for name in ("sigma", "sigma_error"))
+    z = (ours**2 - exact["sigma"][drawn].astype(float) ** 2) / (2 * ours * noise)
+    assert np.sqrt(np.mean(z**2)) == pytest.approx(1, abs=0.25)
     assert np.abs(published["variance"] / variance_of_voxel - 1)[wins].mean() < 0.04
     assert fit["counters"]["voxels_drawn"] < 0.65 * size**3
