@@ -42,11 +42,16 @@ def _ticks(low, high):
     return [m * 10.0**d for d in decades for m in steps if low <= math.log10(m) + d <= high]
 
 
+def _number(value):
+    """Three digits and no exponent: there are no characters for one."""
+    return np.format_float_positional(value, precision=3, fractional=False, trim="-")
+
+
 def seconds_text(seconds):
     for length, unit in ((3600, "h"), (60, "m"), (1, "s")):
         if seconds >= length:
-            return f"{seconds / length:.3g}{unit}"
-    return f"{seconds:.3g}s"
+            return f"{_number(seconds / length)}{unit}"
+    return f"{_number(seconds)}s"
 
 
 def _write(pixels, text, right, bottom, scale=2):
@@ -63,13 +68,18 @@ def _write(pixels, text, right, bottom, scale=2):
 
 def _stroke(pixels, a, b, width, color):
     """A line from a to b with smooth edges, and round ends: a dot where they are one point."""
-    y, x = np.mgrid[:SIZE, :SIZE] + 0.5
+    # Only the pixels about it: a night's history has thousands of strokes.
+    ends = np.clip(np.array([a, b]), -SIZE, 2 * SIZE)
+    x0, y0 = np.maximum(np.floor(ends.min(0) - width / 2 - 1), (_LEFT, _BOTTOM)).astype(int)
+    x1, y1 = np.minimum(np.ceil(ends.max(0) + width / 2 + 1), (SIZE, SIZE - _TOP + 6)).astype(int)
+    if x0 >= x1 or y0 >= y1:
+        return
+    y, x = np.mgrid[y0:y1, x0:x1] + 0.5
     (ax, ay), d = a, np.subtract(b, a)
     along = np.clip(((x - ax) * d[0] + (y - ay) * d[1]) / max(d @ d, 1e-9), 0, 1)
     distance = np.hypot(x - ax - along * d[0], y - ay - along * d[1])
     cover = np.clip(width / 2 + 0.5 - distance, 0, 1)[..., None]
-    cover[:_BOTTOM], cover[:, :_LEFT], cover[SIZE - _TOP + 6 :] = 0, 0, 0
-    pixels[..., :3] += cover * (np.broadcast_to(color, 3) - pixels[..., :3])
+    pixels[y0:y1, x0:x1, :3] += cover * (np.broadcast_to(color, 3) - pixels[y0:y1, x0:x1, :3])
 
 
 def picture(history):
@@ -97,12 +107,15 @@ def picture(history):
     for error in _ticks(y0, y1):
         y = round(place(1, error)[1])
         pixels[y, _LEFT : SIZE - _RIGHT, :3] = _GRID
-        _write(pixels, f"{100 * error:.3g}%", _LEFT - 4, min(y - 5, SIZE - 10))
+        _write(pixels, f"{_number(100 * error)}%", _LEFT - 4, min(y - 5, SIZE - 10))
     # What the error does where twice the samples halve its square, through the last round.
     seconds, error = rows[-1]
     first = 10**x0
     _stroke(pixels, place(first, error * math.sqrt(seconds / first)), place(seconds, error), 1, _GUIDE)
-    where = [place(*row) for row in rows]
+    where = [place(*rows[0])]
+    for at in (place(*row) for row in rows[1:]):
+        if math.dist(at, where[-1]) > 4 or at == place(*rows[-1]):  # no dot on another
+            where.append(at)
     for a, b in zip(where, where[1:], strict=False):
         _stroke(pixels, a, b, 2, _CURVE)
     for at in where:

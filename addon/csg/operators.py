@@ -175,8 +175,8 @@ class GPIS_OT_csg_drag(_ListOperator, bpy.types.Operator):
         settings = context.object.gpis_csg
         if self.index >= len(settings.items):
             return {"CANCELLED"}
-        settings.active = self.index
         self._drag = Drag(context.object, self.index, event.mouse_y, 20 * context.preferences.system.ui_scale)
+        settings.active = self.index  # after the drag has noted which row was
         self._area = context.area
         context.window.cursor_modal_set("SCROLL_Y")
         context.workspace.status_text_set("Move: to another row   Click, Enter: leave it there   Right click, Esc: put it back")

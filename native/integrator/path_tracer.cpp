@@ -363,8 +363,8 @@ std::optional<ScatterSample> PathTracer::Impl::scatter_at(const Ray& ray, const 
   }
   const Scene::Impl::Body& body = scene.bodies[v.body];
   const auto here = [&](auto& of) { return std::span(of).subspan(body.first); };
-  const HitGradient found(body.surface, here(lines),
-                          {v.t, v.surface - static_cast<int>(body.first)}, here(memory), *rng);
+  const TreeHit hit{v.t, v.surface - static_cast<int>(body.first)};
+  const HitGradient found(body.surface, here(lines), hit, here(memory), *rng, *counters);
   const GradientLaw& law = found.law();
   Vec3 gradient = law.mean;
   if (!law.certain()) {

@@ -26,6 +26,8 @@ class BlendMarch {
   static constexpr int kMaxDepth = 64;
   // Draws of all leaves at once until F > 0 there; then the ray is inside.
   static constexpr int kMostDraws = 4096;
+  static constexpr int kFreeDraws = 16;      // before the ranges of the draws are looked for
+  static constexpr double kFarthest = 1000;  // deviations that a value may be from its mean
 
   // F at a point of the line.
   struct Point {
@@ -34,6 +36,10 @@ class BlendMarch {
   // Bounds of a value and of its slope over a stretch.
   struct Enclosure {
     double low, high, slope_low, slope_high;
+  };
+  // Of a value of g.
+  struct Range {
+    double low = -kInfinity, high = kInfinity;
   };
   using Leaf = TreeLines::Leaf;
   using Noise = TreeLines::Noise;
@@ -55,6 +61,9 @@ class BlendMarch {
   void weigh_slopes(std::span<const Start> starts);
   void engage(double a);
   void draw_outside();
+  bool find_range(int noise, Range& range);
+  bool acceptable();
+  bool is_fresh(int noise) const;
 
   const ProcessTree* tree_ = nullptr;
   TreeLines lines_;
@@ -69,6 +78,8 @@ class BlendMarch {
   std::vector<Enclosure> leaf_;           // over the stretch that is looked at
   std::vector<double> values_, weights_;  // of the leaves where F is looked at
   std::vector<int> fresh_;                // noises that are drawn at one point
+  std::vector<Range> ranges_;             // of them
+  std::vector<std::size_t> forgotten_;    // leaves that may be anything at the start
   std::vector<double> slope_mean_, slope_deviation_, slope_weight_;  // of the noises at a start
 };
 

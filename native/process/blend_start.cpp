@@ -7,6 +7,7 @@ namespace gpis {
 
 void BlendMarch::start(std::span<const Start> starts) {
   bool any = false;
+  forgotten_.clear();
   for (std::size_t i = 0; i < lines_.leaves.size(); ++i) {
     Leaf& l = lines_.leaves[i];
     const bool known = starts[i].kind != Start::Kind::outside && l.t_begin < l.t_end;
@@ -16,18 +17,30 @@ void BlendMarch::start(std::span<const Start> starts) {
       values_[i] = l.sign * kInfinity;
     } else if (known) {
       values_[i] = l.sign * starts[i].state.value;
-    } else {  // what was not drawn at the start is far from the surface there
+    } else {  // what was not drawn at the start is far from the surface there, or forgotten
       lines_.enter(l, 0);
-      values_[i] = lines_.combine(l, 0, 0, 0).f > 0 ? kInfinity : -kInfinity;
+      const double mean = lines_.combine(l, 0, 0, 0).f;
+      values_[i] = mean > 0 ? kInfinity : -kInfinity;
+      if (std::abs(mean) <= l.plan->skip_threshold + l.lift) forgotten_.push_back(i);
     }
   }
   if (!any) return;
-  // Values of f, whose rounding is that of the means.
+  // Values of f, whose rounding is that of the means; at a hit they are what its root leaves.
   double size = 0;
-  for (const double v : values_)
-    if (std::isfinite(v)) size += std::abs(v);
+  for (std::size_t i = 0; i < values_.size(); ++i) {
+    if (std::isfinite(values_[i])) size += std::abs(values_[i]);
+    if (std::isfinite(lines_.leaves[i].plan->sigma_max)) size += lines_.leaves[i].plan->sigma_max;
+  }
   for (const ProcessTree::Node& n : tree_->nodes()) size += n.blend;
-  const double f = tree_->compose(values_.data(), weights_.data());
+  double f = tree_->compose(values_.data(), weights_.data());
+  // A forgotten leaf (B2) that would decide F was on the side on which it did not.
+  for (std::size_t turned = 0; turned < forgotten_.size() && std::isinf(f); ++turned)
+    for (std::size_t& i : forgotten_) {
+      if (!(weights_[i] > 0) || !std::isinf(values_[i])) continue;
+      values_[i] = -values_[i];
+      f = tree_->compose(values_.data(), weights_.data());
+      break;
+    }
   leaving_ = std::abs(f) <= 1e-9 * size;
   slope_mean_.assign(lines_.noises.size(), 0);
   slope_deviation_.assign(lines_.noises.size(), 0);
@@ -59,11 +72,13 @@ void BlendMarch::start(std::span<const Start> starts) {
   }
 }
 
-// A noise from what is remembered of the leaf that sees most of it. Where the value alone is, its
-// slope is left open (slope_deviation_ > 0) for weigh_slopes.
+// A noise from what is remembered of a leaf that was hit, whose gradient the path follows, and of
+// those of the one that sees most of it. Where the value alone is remembered, its slope is left
+// open (slope_deviation_ > 0) for weigh_slopes.
 void BlendMarch::tell(std::span<const Start> starts, int noise) {
   int told = -1;
   double most = -1;
+  bool of_hit = false;
   LeafPoint fields;
   for (std::size_t i = 0; i < lines_.leaves.size(); ++i) {
     Leaf& l = lines_.leaves[i];
@@ -71,8 +86,10 @@ void BlendMarch::tell(std::span<const Start> starts, int noise) {
       continue;
     lines_.enter(l, 0);
     const LeafPoint p = lines_.combine(l, 0, 0, 0);
-    if (!(p.sigma > most)) continue;
+    const bool hit = leaving_ && weights_[i] > 0 && p.sigma > 0;
+    if (hit < of_hit || (hit == of_hit && !(p.sigma > most))) continue;
     most = p.sigma;
+    of_hit = hit;
     told = static_cast<int>(i);
     fields = p;
   }
@@ -168,32 +185,80 @@ void BlendMarch::engage(double a) {
   }
 }
 
-// The fresh noises given F > 0, by rejection of whole draws: their values were drawn freely. At a
-// start F is known already, and they are drawn on condition that they are no part of it.
-void BlendMarch::draw_outside() {
-  const bool start = leaving_ && from_.t == 0;
-  bool moved = false;
-  if (outside_) {
-    for (int draw = 0; draw < kMostDraws; ++draw) {
-      bool accepted;
-      if (start) {
-        at(from_);
-        accepted = true;
-        for (std::size_t i = 0; i < weights_.size(); ++i)
-          for (const int k : fresh_) accepted &= lines_.leaves[i].noise != k || weights_[i] == 0;
-      } else {
-        accepted = at(from_).f > 0;
-      }
-      if (accepted) break;
-      moved = true;
-      for (const int k : fresh_) {
-        const LineNoise& path = *lines_.noises[k].path;
-        from_.noise[k].g = path.value_mean() + path.value_deviation() * rng_->normal();
-      }
-      for (std::size_t i = 0; i < lines_.leaves.size(); ++i)
-        for (const int k : fresh_)
-          if (lines_.leaves[i].noise == k) from_.leaf[i].known = false;
+// Whether the leaves of the fresh noises may be as values_ has them: F > 0. At a start F is known
+// already, and they are drawn on condition that they are no part of it.
+bool BlendMarch::acceptable() {
+  const double f = tree_->compose(values_.data(), weights_.data());
+  if (!(leaving_ && from_.t == 0)) return f > 0;
+  for (std::size_t i = 0; i < weights_.size(); ++i)
+    if (weights_[i] > 0 && is_fresh(lines_.leaves[i].noise)) return false;
+  return true;
+}
+
+bool BlendMarch::is_fresh(int noise) const {
+  return std::find(fresh_.begin(), fresh_.end(), noise) != fresh_.end();
+}
+
+// Where g of a fresh noise may lie at all, the leaves of all other fresh noises being as far
+// outside as can be: F grows with every leaf, so it is a half-line that bisection finds. False: it
+// is empty. Leaves of one noise that grow and fall with it leave it unbounded.
+bool BlendMarch::find_range(int noise, Range& range) {
+  const LineNoise& path = *lines_.noises[noise].path;
+  const double mean = path.value_mean(), deviation = path.value_deviation();
+  double sense = 0;
+  for (const Leaf& l : lines_.leaves) {
+    if (l.noise != noise || l.certain != 0) continue;
+    if (sense * l.sign < 0) return true;
+    sense = l.sign > 0 ? 1 : -1;
+  }
+  if (sense == 0 || !(deviation > 0)) return true;
+  const auto possible = [&](double g) {
+    for (std::size_t i = 0; i < values_.size(); ++i) {
+      const Leaf& l = lines_.leaves[i];
+      values_[i] = l.certain != 0      ? l.certain * kInfinity
+                   : l.noise == noise  ? lines_.combine(l, from_.t, g, 0).f
+                   : is_fresh(l.noise) ? kInfinity
+                                       : lines_.point(from_, static_cast<int>(i)).f;
     }
+    return acceptable();
+  };
+  double best = mean + sense * kFarthest * deviation, worst = mean - sense * kFarthest * deviation;
+  if (!possible(best)) return false;
+  if (possible(worst)) return true;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (best + worst);
+    (possible(middle) ? best : worst) = middle;
+  }
+  (sense > 0 ? range.low : range.high) = worst;
+  return true;
+}
+
+// The fresh noises given that they are acceptable, by rejection of whole draws: their values were
+// drawn freely. Where that is rare, each is drawn in the range in which it can be accepted at all.
+void BlendMarch::draw_outside() {
+  bool moved = false;
+  std::vector<Range>& ranges = ranges_;
+  ranges.assign(fresh_.size(), {});
+  for (int draw = 0; outside_ && draw < kMostDraws; ++draw) {
+    at(from_);  // fills values_
+    if (acceptable()) break;
+    moved = true;
+    if (draw == kFreeDraws) {
+      bool possible = true;
+      for (std::size_t j = 0; j < fresh_.size(); ++j)
+        possible = possible && find_range(fresh_[j], ranges[j]);
+      if (!possible) break;
+    }
+    for (std::size_t j = 0; j < fresh_.size(); ++j) {
+      const LineNoise& path = *lines_.noises[fresh_[j]].path;
+      const double mean = path.value_mean(), deviation = path.value_deviation();
+      if (!(deviation > 0)) continue;
+      from_.noise[fresh_[j]].g =
+          mean + deviation * truncated_normal((ranges[j].low - mean) / deviation,
+                                              (ranges[j].high - mean) / deviation, *rng_);
+    }
+    for (std::size_t i = 0; i < lines_.leaves.size(); ++i)
+      if (is_fresh(lines_.leaves[i].noise)) from_.leaf[i].known = false;
   }
   if (!moved) return;
   ++counters_->truncated_normals;
@@ -206,8 +271,7 @@ void BlendMarch::draw_outside() {
     n.conditioned = true;
   }
   for (std::size_t i = 0; i < lines_.leaves.size(); ++i)
-    for (const int k : fresh_)
-      if (lines_.leaves[i].noise == k) from_.leaf[i].known = false;
+    if (is_fresh(lines_.leaves[i].noise)) from_.leaf[i].known = false;
 }
 
 }  // namespace gpis

@@ -97,11 +97,11 @@ FirstHits first_hits(const TreeSurface& surface, const FirstHitsQuery& query) {
         result.leaf[i] = hit.leaf;
         result.position[i] = query.rays[i].at(hit.t);
         std::vector<std::optional<State>> states(leaves);
+        std::optional<HitGradient> found;
         const auto draw = [&] {
-          const HitGradient found(surface, lines, hit, states, rng);
+          found.emplace(surface, lines, hit, states, rng, counters);
           counters.line_normals += 2;
-          result.gradient[i] = found.law().draw(rng);
-          found.remember(result.gradient[i], states);
+          result.gradient[i] = found->law().draw(rng);
         };
         // Where leaves are blended, the gradient is one given those of the others.
         const bool last = surface.tree().has_blends();
@@ -117,6 +117,7 @@ FirstHits first_hits(const TreeSurface& surface, const FirstHitsQuery& query) {
           states[k] = leaf.state(value, leaf.gradient_law(lines[k], hit.t, rng).draw(rng));
         }
         if (last) draw();
+        found->remember(result.gradient[i], states);
         for (std::size_t k = 0; k < leaves; ++k) {
           if (!states[k]) continue;
           result.state_value[i * leaves + k] = states[k]->value;

@@ -1,5 +1,7 @@
 #include "process/hit_gradient.h"
 
+#include <algorithm>
+
 #include "process/line_impl.h"
 #include "process/plan.h"
 
@@ -15,19 +17,40 @@ bool contains(const Box3& box, const Vec3& x) {
 }  // namespace
 
 HitGradient::HitGradient(const TreeSurface& surface, std::span<Line> lines, const TreeHit& hit,
-                         std::span<const std::optional<State>> states, Rng& rng)
+                         std::span<const std::optional<State>> states, Rng& rng, Counters& counters)
     : surface_(surface), leaf_(hit.leaf) {
   if (surface.tree().has_blends()) {
-    blend(lines, hit, states, rng);
+    blend(lines, hit, states, rng, counters);
+    share_noise(lines, hit, rng);
     return;
   }
   law_ = surface.leaves()[leaf_].gradient_law(lines[leaf_], hit.t, rng);
   const double sign = surface.sign(leaf_);
   law_ = {law_.mean * sign, law_.b1 * sign, law_.b2 * sign, law_.degenerate};
+  share_noise(lines, hit, rng);
+}
+
+// Leaves of the noise that was hit and no part of F there: their gradients follow from that of F
+// too, ∇fᵢ = ∇μᵢ + g ∇σᵢ + σᵢ ∇g.
+void HitGradient::share_noise(std::span<Line> lines, const TreeHit& hit, Rng& rng) {
+  const double spread = dot(law_.b1, law_.b1) + dot(law_.b2, law_.b2);
+  if (!(spread > 0)) return;
+  const std::vector<ProcessSurface>& leaves = surface_.leaves();
+  const std::vector<ProcessTree::Leaf>& of_tree = surface_.tree().leaves();
+  for (int k = 0; k < static_cast<int>(leaves.size()); ++k) {
+    if (k == leaf_ || of_tree[k].noise != of_tree[leaf_].noise ||
+        !leaves[k].sampled_at(lines[k], hit.t) ||
+        std::any_of(parts_.begin(), parts_.end(), [&](const Part& p) { return p.leaf == k; }))
+      continue;
+    const GradientLaw law = leaves[k].gradient_law(lines[k], hit.t, rng);
+    followers_.push_back({k, leaves[k].value(lines[k], hit.t, rng), law.mean,
+                          (dot(law.b1, law_.b1) + dot(law.b2, law_.b2)) / spread});
+  }
 }
 
 void HitGradient::blend(std::span<Line> lines, const TreeHit& hit,
-                        std::span<const std::optional<State>> states, Rng& rng) {
+                        std::span<const std::optional<State>> states, Rng& rng,
+                        Counters& counters) {
   const ProcessTree& tree = surface_.tree();
   const std::vector<ProcessSurface>& leaves = surface_.leaves();
   std::vector<double> values(leaves.size()), weights(leaves.size());
@@ -52,6 +75,7 @@ void HitGradient::blend(std::span<Line> lines, const TreeHit& hit,
     GradientLaw law = leaves[k].gradient_law(lines[k], hit.t, rng);
     if (tree.leaves()[k].noise != noise) {
       const bool known = states[k] && leaves[k].memory() != Memory::renewal;
+      if (!known) counters.line_normals += 2;
       law_.mean += (known ? leaves[k].world_gradient(*states[k]) : law.draw(rng)) * weight;
       continue;
     }
@@ -72,13 +96,12 @@ void HitGradient::blend(std::span<Line> lines, const TreeHit& hit,
 }
 
 void HitGradient::remember(const Vec3& gradient, std::span<std::optional<State>> states) const {
-  if (parts_.empty()) {
+  if (parts_.empty())
     states[leaf_] = surface_.leaves()[leaf_].state(0, gradient * surface_.sign(leaf_));
-    return;
-  }
-  for (const Part& part : parts_)
-    states[part.leaf] = surface_.leaves()[part.leaf].state(
-        part.value, part.mean + (gradient - law_.mean) * part.share);
+  for (const std::vector<Part>* parts : {&parts_, &followers_})
+    for (const Part& part : *parts)
+      states[part.leaf] = surface_.leaves()[part.leaf].state(
+          part.value, part.mean + (gradient - law_.mean) * part.share);
 }
 
 }  // namespace gpis

@@ -16,7 +16,7 @@ class HitGradient {
   // `states`: one a leaf; gradients of blended leaves that are remembered are those, others are
   // drawn. `lines` hold the paths of the hit.
   HitGradient(const TreeSurface& surface, std::span<Line> lines, const TreeHit& hit,
-              std::span<const std::optional<State>> states, Rng& rng);
+              std::span<const std::optional<State>> states, Rng& rng, Counters& counters);
 
   // World space, in the sense in which F grows (of a ray inside: as the leaf's own law turns it).
   const GradientLaw& law() const { return law_; }
@@ -32,12 +32,14 @@ class HitGradient {
     double share;  // of what the gradient differs from the mean of its law
   };
   void blend(std::span<Line> lines, const TreeHit& hit,
-             std::span<const std::optional<State>> states, Rng& rng);
+             std::span<const std::optional<State>> states, Rng& rng, Counters& counters);
+  void share_noise(std::span<Line> lines, const TreeHit& hit, Rng& rng);
 
   const TreeSurface& surface_;
   GradientLaw law_;
   int leaf_;
-  std::vector<Part> parts_;  // of the noise of the hit; none without blends
+  // Of the noise of the hit: what F is blended of (none without blends), and what only follows.
+  std::vector<Part> parts_, followers_;
 };
 
 }  // namespace gpis

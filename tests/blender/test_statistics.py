@@ -67,7 +67,7 @@ def test_the_plot_shows_every_round_where_it_belongs(plot):
 
 @pytest.mark.parametrize("seconds", [(1e-3, 2e-3), (1, 1.001), (0.5, 90_000), (3, 7200)])
 def test_the_plot_takes_any_history(plot, seconds):
-    for errors in ((1e-8, 1e-9), (4.0, 2.0), (0.01, 0.01)):
+    for errors in ((1e-8, 1e-9), (4.0, 2.0), (0.01, 0.01), (1e3, 1e3), (1e4, 1e-14)):
         assert plot.picture(history(*zip(seconds, errors, strict=True))) is not None
 
 

@@ -200,3 +200,75 @@ def test_names_of_trees():
     for blend in (0, -1, np.nan, np.inf):
         with pytest.raises(ValueError, match="smooth_union: blend"):
             gn.smooth_union(a, b, blend=blend)
+
+
+def unit(v):
+    return v / np.linalg.norm(v, axis=1, keepdims=True)
+
+
+def continued(tree, memory, n, seed):
+    """First hits of rays that leave first hits in directions about the gradient there."""
+    found = gn.first_hits(tree, *rays(n), 4, memory=memory, seed=seed)
+    hit = np.isfinite(found["t"])
+    rng = np.random.default_rng(seed)
+    directions = unit(unit(found["gradient"][hit]) + unit(rng.normal(size=(hit.sum(), 3))))
+    start = {name: found["state"][name][hit] for name in ("value", "gradient")}
+    return gn.first_hits(tree, found["position"][hit], directions, 4, memory=memory, start=start, seed=seed + 1)
+
+
+ROUGH_BALL = Leaf(gn.SphereField([0, 0, 0], 0.7), 0.2, 0.5)
+FLOOR = gn.GaussianProcess(gn.PlaneField([0, 0, 0], [0, 0, 1]), 0, gn.SquaredExponential(1))
+LEAVING = {
+    "two": ([a, b], {}),
+    "shared": (process(SAME), {"shared_noise": True}),
+    "large bumps": (process([Leaf(gn.SphereField([x, 0.1, 0], 0.7), 1.0, 3.0) for x in (1.4, 2.2)]), {}),
+}
+
+
+@pytest.mark.parametrize("memory", ["none", "renewal", "renewal+"])
+@pytest.mark.parametrize("name", LEAVING)
+def test_rays_leave_it_as_they_leave_the_union(name, memory, n, seed):
+    """Radius -> 0 again, from hits on: none is met again at once, none counts as inside."""
+    leaves, options = LEAVING[name]
+    trees = gn.union(*leaves, **options), gn.smooth_union(*leaves, blend=1e-7, **options)
+    hard, smooth = (continued(tree, memory, 2 * n, seed + 10 * i) for i, tree in enumerate(trees))
+    check_same_distribution(hard["t"], smooth["t"], f"{name}, {memory}")
+    assert np.mean(smooth["t"] < 1e-4) <= np.mean(hard["t"] < 1e-4) + 2e-3
+    assert smooth["counters"]["line_entry_inside"] <= 2e-4 * n
+
+
+@pytest.mark.parametrize("blend", [1e-7, 0.05])
+def test_a_forgotten_leaf_was_not_in_the_way(blend, n, seed):
+    """Memory none: what is known of a floor without bumps does not say that a ball above it, whose mean is below 0, is there."""
+    origins, up = np.tile([0.6, 0, 0.0], (n, 1)), unit(np.tile([-0.3, 0, 1.0], (n, 1)))
+    start = {"value": np.tile([np.nan, 0], (n, 1)), "gradient": np.tile([[np.nan] * 3, [0, 0, 1]], (n, 1, 1))}
+    trees = gn.union(ROUGH_BALL.process, FLOOR), gn.smooth_union(ROUGH_BALL.process, FLOOR, blend=blend)
+    hard, smooth = (gn.first_hits(t, origins, up, 4, memory="none", start=start, seed=seed + i) for i, t in enumerate(trees))
+    assert smooth["counters"]["line_entry_inside"] == hard["counters"]["line_entry_inside"] == 0
+    if blend < 1e-6:
+        check_same_distribution(hard["t"], smooth["t"])
+
+
+@pytest.mark.parametrize("depth", [0.5, 0.7, 0.9])
+def test_rays_enter_deep_below_the_mean(depth, n, seed):
+    """Definitions B2, B4: a ray that enters the bounds 4.5 deviations below the mean of a ground is outside there all the same."""
+    bounds = ((-3, -3, -3), (3, 3, 3))
+    ground = gn.GaussianProcess(gn.PlaneField([0, 0, 0], [0, 0, 1]), 0.2, gn.SquaredExponential(0.5), bounds=bounds)
+    ball = gn.GaussianProcess(gn.SphereField([0, 0, 2], 0.3), 0.05, gn.SquaredExponential(0.5), bounds=bounds)
+    origins, along = np.tile([-4, 0, -depth], (n, 1)), np.tile([1.0, 0, 0], (n, 1))
+    trees = gn.union(ground, ball), gn.smooth_union(ground, ball, blend=0.2)
+    hard, smooth = (gn.first_hits(t, origins, along, 9, seed=seed + i) for i, t in enumerate(trees))
+    assert smooth["counters"]["line_entry_inside"] == 0
+    check_same_distribution(hard["t"], smooth["t"])
+
+
+def test_gradients_of_one_noise_fit_together(n, seed):
+    """Two spheres of one noise: σ∇g = ∇f - ∇μ is the same at a hit whichever leaf tells it."""
+    centers, radius = np.array([[1.4, 0, 0], [2.4, 0, 0]]), 0.7
+    leaves = [gn.GaussianProcess(gn.SphereField(x, radius), 0.2, gn.SquaredExponential(0.5)) for x in centers]
+    for tree in (gn.union(*leaves, shared_noise=True), gn.smooth_union(*leaves, blend=0.02, shared_noise=True)):
+        hits = gn.first_hits(tree, *rays(n), 4, memory="renewal+", seed=seed)
+        both = np.isfinite(hits["state"]["value"]).all(axis=1)
+        assert both.mean() > 0.05
+        noise = [hits["state"]["gradient"][both, k] - unit(hits["position"][both] - centers[k]) for k in range(2)]
+        np.testing.assert_allclose(noise[0], noise[1], atol=1e-6)
