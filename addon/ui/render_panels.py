@@ -110,15 +110,18 @@ class GPIS_PT_statistics(PropertiesPanel, bpy.types.Panel):
         layout.operator("gpis.save_statistics", icon="EXPORT")
 
 
-class GPIS_PT_error_plot(PropertiesPanel, bpy.types.Panel):
-    """Estimated error against seconds, round by round, both axes logarithmic"""
-
-    bl_label = "Error against Time"
+class _OfLastRender(PropertiesPanel):
     bl_parent_id = "GPIS_PT_statistics"
 
     @classmethod
     def poll(cls, context):
         return super().poll(context) and statistics.last(context.scene.name) is not None
+
+
+class GPIS_PT_error_plot(_OfLastRender, bpy.types.Panel):
+    """Estimated error against seconds, round by round, both axes logarithmic"""
+
+    bl_label = "Error against Time"
 
     def draw(self, context):
         history = statistics.last(context.scene.name)["history"]
@@ -133,16 +136,11 @@ class GPIS_PT_error_plot(PropertiesPanel, bpy.types.Panel):
             wrapped(column, context, f"Error falls as seconds to the power {slope:.2f}; the grey line is -0.50")
 
 
-class GPIS_PT_counts(PropertiesPanel, bpy.types.Panel):
+class GPIS_PT_counts(_OfLastRender, bpy.types.Panel):
     """What the renderer did, in numbers that do not depend on the machine"""
 
     bl_label = "Counts"
-    bl_parent_id = "GPIS_PT_statistics"
     bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context):
-        return super().poll(context) and statistics.last(context.scene.name) is not None
 
     def content(self, layout, context):
         column = layout.column(align=True)
@@ -151,16 +149,11 @@ class GPIS_PT_counts(PropertiesPanel, bpy.types.Panel):
                 _row(column, name.replace("_", " "), _number(value))
 
 
-class GPIS_PT_plan(PropertiesPanel, bpy.types.Panel):
+class GPIS_PT_plan(_OfLastRender, bpy.types.Panel):
     """Which sampler serves each object and why, and what the render leaves out"""
 
     bl_label = "Plan"
-    bl_parent_id = "GPIS_PT_statistics"
     bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context):
-        return super().poll(context) and statistics.last(context.scene.name) is not None
 
     def draw(self, context):
         left_out = []

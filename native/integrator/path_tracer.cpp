@@ -3,6 +3,7 @@
 #include "integrator/dielectric_scatter.h"
 #include "integrator/reach.h"
 #include "integrator/scatter.h"
+#include "integrator/vertex.h"
 #include "process/hit_gradient.h"
 #include "process/realisation_memory.h"
 #include "process/segment_memory.h"
@@ -23,22 +24,6 @@ constexpr int kVertexDecisions = kLightDecision + LightSet::kMostGroups;
 // What a path knows of each stochastic surface at the point it leaves; nothing: a fresh start
 // outside of it.
 using PathMemory = std::vector<std::optional<State>>;
-
-struct Vertex {
-  double t = kInfinity;
-  Vec3 position;          // of the surface
-  Vec3 departure;         // where rays start that stay on this side
-  Vec3 beyond;            // and those that go through
-  Vec3 geometric_normal;  // facing the ray
-  Vec3 shading_normal;
-  const Material* material = nullptr;
-  Color tint = kNoTint;  // the painted albedo there
-  int surface = -1;      // which stochastic surface, -1 for a mesh
-  int body = -1;         // and of which object
-  bool inside = false;   // the ray came inside of it
-
-  const Vec3& start(bool transmitted) const { return transmitted ? beyond : departure; }
-};
 
 }  // namespace
 
@@ -113,6 +98,7 @@ PathTracer::PathTracer(const Scene& scene, const std::atomic<bool>* stop)
   for (Line& line : impl_->shadow_lines) line.stop_when(stop);
 }
 PathTracer::~PathTracer() = default;
+
 PathSample PathTracer::trace(const Ray& camera_ray, double t_max, const BlockPoints& points,
                              Rng& rng, Counters& counters) {
   impl_->points = &points;
@@ -139,6 +125,7 @@ PathSample PathTracer::Impl::trace(const Ray& camera_ray, double t_max) {
   for (bounce = 0;; ++bounce) {
     Vertex v;
     const bool hit = closest(ray, bounce == 0 ? t_max : kInfinity, v);
+
     // Light that the ray meets on its way.
     result.radiance += throughput * (bounce == 0 ? scene.lights.met_by_camera(ray, v.t)
                                                  : scene.lights.met(ray, v.t, scatter_pdf));
@@ -148,6 +135,7 @@ PathSample PathTracer::Impl::trace(const Ray& camera_ray, double t_max) {
       break;
     }
     ++counters->path_vertices;
+
     // Scatter, and light the vertex from sampled lights.
     remember_others(v);
     keep_segments(v);
@@ -167,6 +155,7 @@ PathSample PathTracer::Impl::trace(const Ray& camera_ray, double t_max) {
       break;
     }
     throughput = throughput * next->weight;
+
     // Russian roulette, only on what has been lost: a lossless path is never ended.
     const double brightest = max_component(throughput);
     if (!(brightest > 0)) break;

@@ -20,9 +20,6 @@ TreeHit BlendMarch::first_hit(const ProcessTree& tree, std::span<const PlannedLi
   leaving_ = false;
   start(starts);
   march(t_max);
-  bool drawn = false;
-  for (const Noise& n : lines_.noises) drawn = drawn || n.begun;
-  ++(drawn ? counters.line_segments : counters.line_skipped);
   lines_.finish();
   return hit_;
 }
@@ -32,17 +29,8 @@ bool BlendMarch::march(double t_end) {
   const std::atomic<bool>* stop = lines_.leaves[0].line->stop;
   for (int steps = 0; steps < kMaxSteps; ++steps) {
     if (steps % kStepsToStop == kStepsToStop - 1 && stop && *stop) return false;
-    for (std::size_t i = 0; i < lines_.leaves.size(); ++i)
-      lines_.look_ahead(lines_.leaves[i], a, from_.leaf[i]);
-    const TreeLines::Stretch sure = lines_.certain(*tree_, tree_->root());
-    if (sure.sign != 0) {
-      if (sure.sign < 0 && outside_) ++counters_->line_entry_inside;
-      outside_ = sure.sign > 0;
-      if (!(sure.until < t_end)) return false;
-      a = sure.until;
-      for (Leaf& l : lines_.leaves) l.engaged = false;
-      for (Noise& n : lines_.noises) n.current = false;
-      from_.reset(a, lines_.noises.size(), lines_.leaves.size());
+    if (lines_.skip_certain(*tree_, from_, a, outside_)) {
+      if (!(a < t_end)) return false;
       continue;
     }
     step_over(a, t_end);

@@ -64,6 +64,9 @@ void TreeLines::reset(const ProcessTree& tree, std::span<const PlannedLine* cons
 }
 
 void TreeLines::finish() {
+  bool drawn = false;
+  for (const Noise& n : noises) drawn = drawn || n.begun;
+  ++(drawn ? counters_->line_segments : counters_->line_skipped);
   for (Leaf& l : leaves) {
     const Noise& n = noises[l.noise];
     if (n.line == l.line) continue;
@@ -149,6 +152,20 @@ TreeLines::Stretch TreeLines::certain(const ProcessTree& tree, int node) const {
     all.until = std::min(all.until, s.until);
   }
   return dominated.sign != 0 ? dominated : all;
+}
+
+bool TreeLines::skip_certain(const ProcessTree& tree, TreeSample& from, double& a, bool& outside) {
+  for (std::size_t i = 0; i < leaves.size(); ++i) look_ahead(leaves[i], a, from.leaf[i]);
+  const Stretch sure = certain(tree, tree.root());
+  if (sure.sign == 0) return false;
+  // Inside for certain: the camera is, or bounds cut a subtracted leaf off.
+  if (sure.sign < 0 && outside) ++counters_->line_entry_inside;
+  outside = sure.sign > 0;
+  a = sure.until;
+  for (Leaf& l : leaves) l.engaged = false;
+  for (Noise& n : noises) n.current = false;
+  from.reset(a, noises.size(), leaves.size());
+  return true;
 }
 
 LeafPoint TreeLines::combine(const Leaf& l, double t, double g, double dg) {

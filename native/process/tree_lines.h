@@ -73,7 +73,7 @@ class TreeLines {
   void reset(const ProcessTree& tree, std::span<const PlannedLine* const> plans,
              const LineGeometry& geometry, std::span<Line> lines, double t_max, Rng& rng,
              Counters& counters);
-  // Leads all lines to their paths, for values and gradients after the march.
+  // Counts the ray, and leads all lines to their paths, for values and gradients after the march.
   void finish();
 
   // A new path for this noise from `anchor` on; nothing of it is drawn yet.
@@ -92,6 +92,9 @@ class TreeLines {
     double until;
   };
   Stretch certain(const ProcessTree& tree, int node) const;
+  // Where F is certain at a: leads a to where it is not, `outside` to F > 0 there, forgets what was
+  // looked at, and returns true.
+  bool skip_certain(const ProcessTree& tree, TreeSample& from, double& a, bool& outside);
 
   // f = μ + σ g, f' = μ' + gσ' + σ g' (math.md §2).
   LeafPoint combine(const Leaf& leaf, double t, double g, double dg);
