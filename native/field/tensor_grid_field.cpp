@@ -1,17 +1,10 @@
 #include "field/tensor_grid_field.h"
 
-#include <Eigen/Eigenvalues>
-
+#include "core/symmetric_eigen.h"
 #include "field/check.h"
 
 namespace gpis {
 namespace {
-
-Eigen::Vector3d eigenvalues_of(const SymMat3& a) {
-  Eigen::Matrix3d m;
-  m << a.xx, a.xy, a.xz, a.xy, a.yy, a.yz, a.xz, a.yz, a.zz;
-  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m, Eigen::EigenvaluesOnly).eigenvalues();
-}
 
 constexpr double kSharp = 0.5;  // of kinks
 
@@ -69,7 +62,7 @@ void TensorGridField::check_nodes(const std::function<std::string(const Index3&)
         if (range.max > 0 && positive_definite(a - SymMat3::identity(range.min)) &&
             positive_definite(SymMat3::identity(range.max) - a))
           continue;
-        const Eigen::Vector3d e = eigenvalues_of(a);
+        const auto e = eigenvalues_of(a);
         if (!(e[0] > 1e-12 * e[2]))
           refuse("", node_name({i, j, k}), " is a matrix with the eigenvalue ", e[0],
                  " (the largest is ", e[2],

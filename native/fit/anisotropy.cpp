@@ -1,9 +1,8 @@
 #include "fit/anisotropy.h"
 
-#include <Eigen/Eigenvalues>
 #include <atomic>
 
-#include "core/sym_mat3.h"
+#include "core/symmetric_eigen.h"
 
 namespace gpis {
 namespace {
@@ -30,18 +29,13 @@ SymMat3 limited_inverse(const SymMat3& p, double shortest, double longest, bool&
     const SymMat3 a = factor.inverse();
     if (a.xx + a.yy + a.zz <= 1 / least) return a;
   }
-  Eigen::Matrix3d m;
-  m << p.xx, p.xy, p.xz, p.xy, p.yy, p.yz, p.xz, p.yz, p.zz;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(m);
+  const SymmetricEigen3 eigen(p);
   SymMat3 a;
   for (int k = 0; k < 3; ++k) {
-    const double value = eigen.eigenvalues()[k];
+    const double value = eigen.values[k];
     const double kept = std::clamp(value, least, most);
     limited |= !(std::abs(value - kept) <= 1e-6 * kept);
-    const Eigen::Vector3d v = eigen.eigenvectors().col(k);
-    const double inverse = 1 / kept;
-    a = a + SymMat3{v[0] * v[0], v[1] * v[1], v[2] * v[2], v[0] * v[1], v[0] * v[2], v[1] * v[2]} *
-                inverse;
+    a = a + SymMat3::of(outer(eigen.vectors[k], eigen.vectors[k])) * (1 / kept);
   }
   return a;
 }

@@ -1,27 +1,9 @@
 #include "kernel/product_kernel.h"
 
-#include <Eigen/SVD>
+#include "core/orthogonal_rows.h"
 
 namespace gpis {
 namespace {
-
-// B with BᵀB = B₁ᵀB₁ + B₂ᵀB₂ and orthogonal rows, from the singular values of both on top of each
-// other: squaring them first would lose a ratio of lengths above 1e8.
-Mat3 combined_whitening(const Mat3& a, const Mat3& b) {
-  Eigen::Matrix<double, 6, 3> both;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) {
-      both(i, j) = a.row[i][j];
-      both(i + 3, j) = b.row[i][j];
-    }
-  const Eigen::JacobiSVD<Eigen::Matrix<double, 6, 3>> svd(both, Eigen::ComputeFullV);
-  const Eigen::Vector3d& s = svd.singularValues();
-  Mat3 out;
-  for (int i = 0; i < 3; ++i)  // below 1e-14 of the largest it is the rounding of a zero
-    for (int j = 0; j < 3; ++j)
-      out.row[i][j] = s[i] > 1e-14 * s[0] ? s[i] * svd.matrixV()(j, i) : 0;
-  return out;
-}
 
 // False where the product of the radial parts is not one of the families.
 bool multiply_radial(const Term& a, const Term& b, Term& out) {
@@ -36,7 +18,7 @@ bool multiply_radial(const Term& a, const Term& b, Term& out) {
       b.radial.family != Family::squared_exponential)
     return false;
   out.radial = a.radial;
-  out.whitening = combined_whitening(a.whitening, b.whitening);
+  out.whitening = orthogonal_rows(a.whitening, b.whitening);
   return true;
 }
 

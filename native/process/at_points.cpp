@@ -2,9 +2,8 @@
 
 #include <tbb/parallel_for.h>
 
-#include <Eigen/Eigenvalues>
-
 #include "core/rng.h"
+#include "core/symmetric_eigen.h"
 #include "field/check.h"
 #include "process/posterior.h"
 
@@ -93,9 +92,8 @@ Eigen::MatrixXd sample_at(const GaussianProcess& process, const std::vector<Vec3
     mean += whitened.transpose() * rows.whitened();
     covariance -= whitened.transpose() * whitened;
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance);
-  const Eigen::MatrixXd factor =
-      eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+  const SymmetricEigen eigen(covariance);
+  const Eigen::MatrixXd factor = eigen.vectors * eigen.values.cwiseMax(0).cwiseSqrt().asDiagonal();
   for (Eigen::Index row = 0; row < rows; ++row) {
     Rng rng(seed, static_cast<std::uint64_t>(row));
     for (auto& v : xi) v = rng.normal();

@@ -1,12 +1,12 @@
 #include "process/dense_path.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <map>
 #include <mutex>
 #include <tuple>
 
+#include "core/symmetric_eigen.h"
 #include "field/check.h"
 #include "process/march_sampler.h"
 
@@ -28,7 +28,6 @@ Eigen::Matrix2d block(const Radial& radial, double q) {
 // off as h³ and faster, and would cancel in double: long double throughout.
 DensePath::Plan::Halving halving(const Radial& radial, double h) {
   using Real = long double;
-  using Matrix = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
   const Real points[] = {0, h, Real(h) / 2};
   // κ and its derivatives in long double.
   const auto covariance = [&](Real q, int dx, int dy) -> Real {
@@ -55,12 +54,13 @@ DensePath::Plan::Halving halving(const Radial& radial, double h) {
     if (dx + dy == 2) return -curvature;
     return dx ? sign * slope : -sign * slope;
   };
-  Matrix all(6, 6);
+  Eigen::Matrix<Real, 6, 6> all;
   for (int i = 0; i < 6; ++i)
     for (int j = 0; j < 6; ++j) all(i, j) = covariance(points[i / 2] - points[j / 2], i % 2, j % 2);
-  const Matrix ends = all.topLeftCorner(4, 4), cross = all.bottomLeftCorner(2, 4);
-  const Matrix mean = ends.fullPivLu().solve(cross.transpose()).transpose();
-  const Matrix rest = all.bottomRightCorner(2, 2) - mean * cross.transpose();
+  const Eigen::Matrix<Real, 4, 4> ends = all.topLeftCorner<4, 4>();
+  const Eigen::Matrix<Real, 2, 4> cross = all.bottomLeftCorner<2, 4>();
+  const Eigen::Matrix<Real, 2, 4> mean = ends.fullPivLu().solve(cross.transpose()).transpose();
+  const Eigen::Matrix<Real, 2, 2> rest = all.bottomRightCorner<2, 2>() - mean * cross.transpose();
   DensePath::Plan::Halving out;
   out.mean = mean.cast<double>();
   // Value and slope of the midpoint are independent: symmetry.
@@ -126,16 +126,14 @@ class DenseFactor {
       for (int r = 0; r < points_; ++r)
         for (int c = 0; c < points_; ++c)
           k.block<2, 2>(2 * r, 2 * c) = block(radial_, (r - c) * step_);
-      const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(k);
-      if (eigen.info() != Eigen::Success)
-        throw std::runtime_error("The dense sampler could not factorise its covariance matrix.");
+      const SymmetricEigen eigen(k);
       // Eigenvalues below 1e-14 of the largest are rounding noise of the matrix itself.
-      const auto& values = eigen.eigenvalues();  // increasing
+      const auto& values = eigen.values;
       const double floor = 1e-14 * values[values.size() - 1];
       Eigen::Index rank = 0;
       while (rank < values.size() && values[values.size() - 1 - rank] > floor) ++rank;
       const Eigen::MatrixXd root =
-          eigen.eigenvectors().rightCols(rank) * values.tail(rank).cwiseSqrt().asDiagonal();
+          eigen.vectors.rightCols(rank) * values.tail(rank).cwiseSqrt().asDiagonal();
       const Eigen::MatrixXd qr = root.transpose().householderQr().matrixQR();
       matrix_ = qr.triangularView<Eigen::Upper>().transpose();
       ++counters.factorisations;

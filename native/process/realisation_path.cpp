@@ -1,7 +1,6 @@
 #include "process/realisation_path.h"
 
-#include <Eigen/Eigenvalues>
-
+#include "core/symmetric_eigen.h"
 #include "field/check.h"
 #include "process/march_sampler.h"
 
@@ -14,13 +13,12 @@ Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& matrix) {
   // Values and slopes have units of their own.
   const Eigen::VectorXd unit =
       matrix.diagonal().unaryExpr([](double v) { return v > 0 ? 1 / std::sqrt(v) : 1.0; });
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(unit.asDiagonal() * matrix *
-                                                             unit.asDiagonal());
-  const double floor = 1e-12 * eigen.eigenvalues().maxCoeff();
+  const SymmetricEigen eigen(unit.asDiagonal() * matrix * unit.asDiagonal());
+  const double floor = 1e-12 * eigen.values.maxCoeff();
   const Eigen::VectorXd inverse =
-      eigen.eigenvalues().unaryExpr([&](double v) { return v > floor ? 1 / v : 0.0; });
-  return unit.asDiagonal() * eigen.eigenvectors() * inverse.asDiagonal() *
-         eigen.eigenvectors().transpose() * unit.asDiagonal();
+      eigen.values.unaryExpr([&](double v) { return v > floor ? 1 / v : 0.0; });
+  return unit.asDiagonal() * eigen.vectors * inverse.asDiagonal() * eigen.vectors.transpose() *
+         unit.asDiagonal();
 }
 
 Eigen::Vector4d row(double value, const Vec3& slope) {

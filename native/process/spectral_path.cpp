@@ -1,8 +1,7 @@
 #include "process/spectral_path.h"
 
-#include <Eigen/Eigenvalues>
-
 #include "core/sincos.h"
+#include "core/symmetric_eigen.h"
 #include "process/across.h"
 #include "process/march_sampler.h"
 
@@ -138,19 +137,7 @@ Mat3 SpectralPath::gradient_precision() const {
     g = g + (outer(line.along, line.along) * along + outer(k, k)) * line.term->weight;
     for (const Vec3& across : line.across) g = g + outer(across, across);
   }
-  Eigen::Matrix3d matrix;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) matrix(i, j) = g.row[i][j];
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(matrix);
-  Mat3 precision = Mat3{} * 0;
-  for (int i = 0; i < 3; ++i) {
-    const double value = eigen.eigenvalues()[i];
-    if (!(value > 1e-13 * eigen.eigenvalues()[2])) continue;
-    const Eigen::Vector3d axis = eigen.eigenvectors().col(i);
-    const Vec3 v{axis[0], axis[1], axis[2]};
-    precision = precision + outer(v, v) * (1 / value);
-  }
-  return precision;
+  return pseudo_inverse(g);
 }
 
 // Adds cov(·, g(0)) value + cov(·, ∇g(0)) gradient to the path: its waves are independent, of

@@ -1,7 +1,6 @@
 #include "process/sum_path.h"
 
-#include <Eigen/Eigenvalues>
-
+#include "core/symmetric_eigen.h"
 #include "field/check.h"
 #include "process/across.h"
 #include "process/march_sampler.h"
@@ -22,23 +21,6 @@ void add_slopes(const Term& term, std::vector<Vec3>& slopes) {
   for (const Vec3& row : term.whitening.row)
     if (size > 0 && length(row) > 0) slopes.push_back(row * size);
   if (term.modulated()) slopes.push_back(term.wave_vector * std::sqrt(term.weight));
-}
-
-// Where nothing changes along an axis no gradient has a part along it.
-Mat3 pseudo_inverse(const Mat3& m) {
-  Eigen::Matrix3d matrix;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) matrix(i, j) = m.row[i][j];
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(matrix);
-  Mat3 out = Mat3{} * 0;
-  for (int i = 0; i < 3; ++i) {
-    const double value = eigen.eigenvalues()[i];
-    if (!(value > 1e-13 * eigen.eigenvalues()[2])) continue;
-    const Eigen::Vector3d axis = eigen.eigenvectors().col(i);
-    const Vec3 v{axis[0], axis[1], axis[2]};
-    out = out + outer(v, v) * (1 / value);
-  }
-  return out;
 }
 
 }  // namespace
@@ -73,6 +55,7 @@ SumPath::Plan::Plan(const GaussianProcess& process, const Box3& bounds) {
   correlation_error /= variance;
   Mat3 covariance = Mat3{} * 0;
   for (const Part& part : parts) covariance = covariance + part.covariance;
+  // Where nothing changes along an axis no gradient has a part along it.
   precision = pseudo_inverse(covariance);
 }
 
