@@ -1,12 +1,11 @@
 #include "integrator/path_tracer.h"
 
 #include "integrator/dielectric_scatter.h"
+#include "integrator/path_memory.h"
 #include "integrator/reach.h"
 #include "integrator/scatter.h"
 #include "integrator/vertex.h"
 #include "process/hit_gradient.h"
-#include "process/realisation_memory.h"
-#include "process/segment_memory.h"
 #include "scene/scene_impl.h"
 
 namespace gpis {
@@ -21,33 +20,33 @@ constexpr int kRouletteStart = 3;
 constexpr int kGradientDecision = 0, kDirectionDecision = 1, kLightDecision = 2;
 constexpr int kVertexDecisions = kLightDecision + LightSet::kMostGroups;
 
-// What a path knows of each stochastic surface at the point it leaves; nothing: a fresh start
-// outside of it.
-using PathMemory = std::vector<std::optional<State>>;
+// One a leaf of a body.
+using States = std::span<std::optional<State>>;
 
 }  // namespace
 
 struct PathTracer::Impl {
-  explicit Impl(const Scene& s)
+  Impl(const Scene& s, const std::atomic<bool>* stop_when)
       : scene(s.impl()),
+        stop(stop_when),
         max_bounces(s.description().settings.max_bounces.value_or(kPathLengthLimit)),
-        lines(scene.stochastic.size()),
-        met(scene.stochastic.size()),
-        starts(scene.stochastic.size()),
-        memory(scene.stochastic.size()),
-        shadow_memory(scene.stochastic.size()),
-        realisations(scene.stochastic.size()),
-        segments(scene.stochastic.size()),
-        inside(scene.bodies.size()) {
-    for (const auto& body : scene.bodies)
-      if (body.surface.leaves().size() > shadow_lines.size())
-        shadow_lines.resize(body.surface.leaves().size());
+        path(scene),
+        first_line(scene.bodies.size()) {
+    std::size_t most = 0;
+    for (const auto& body : scene.bodies) most = std::max(most, body.surface.leaves().size());
+    starts.resize(most);
+    shadow_lines.resize(most);
+    for (Line& line : shadow_lines) line.stop_when(stop);
   }
 
   PathSample trace(const Ray& camera_ray, double t_max);
-  TreeHit first_hit(const Scene::Impl::Body& body, bool from_inside, Line* body_lines,
-                    const Ray& ray, double t_max, const PathMemory& remembered,
-                    std::vector<RealisationMemory>& kept, Rng& random);
+  TreeHit first_hit(int b, bool from_inside, std::span<Line> drawn, const Ray& ray, double t_max,
+                    States remembered, std::span<RealisationMemory> kept, Rng& random);
+  // That hold the sample paths of a body along the ray in hand, which has entered it.
+  std::span<Line> lines_of(int b) {
+    return std::span(lines).subspan(first_line[b], scene.bodies[b].surface.leaves().size());
+  }
+  std::span<Line> take_lines(int b);
   bool closest(const Ray& ray, double t_max, Vertex& v);
   void leave_bounds(const Ray& ray, double t);
   void remember_others(const Vertex& v);
@@ -60,29 +59,28 @@ struct PathTracer::Impl {
   SquarePoint point(int decision, Rng& source) const {
     return points->point(kPixelDecision + 1 + bounce * kVertexDecisions + decision, source);
   }
-  bool visible(const Ray& ray, double distance, int crossed);
+  bool visible(const Ray& ray, double distance, const Vertex& v, bool transmitted);
   template <class Scatter, class Remember>
   Color sample_lights(const Vertex& v, const Scatter& scatter, const Remember& remember);
   std::optional<ScatterSample> scatter_at(const Ray& ray, const Vertex& v, Color& direct,
                                           Vec3& normal);
 
   const Scene::Impl& scene;
+  const std::atomic<bool>* const stop;
   const int max_bounces;
-  // The sample path of each stochastic surface along the ray; `met` tells which were drawn for it.
+  PathMemory path;
+  // The sample paths along the ray in hand: one a leaf of the bodies that it has entered, in their
+  // order, from first_line[body] on.
   std::vector<Line> lines;
-  std::vector<char> met;
+  std::vector<std::size_t> first_line;
+  std::size_t lines_taken = 0;
   std::vector<Line> shadow_lines;
   std::vector<Start> starts;
   TreeSurface::March march;
-  PathMemory memory, shadow_memory;
-  // That the path sees, of memory `global`; a shadow ray sees a copy.
-  std::vector<RealisationMemory> realisations, shadow_realisations;
-  // What it has met, of memory `segments`; shadow rays read it alone.
-  std::vector<SegmentMemory> segments;
-  // Of each stochastic body, whether the ray in hand travels inside of it. Every body is a medium
-  // in air: where two overlap, each refracts as if the other were not there (no priorities). The
-  // sides of meshes are told by the order of their corners.
-  std::vector<char> inside;
+  std::vector<BoxTree::Entry> queue;
+  // Of the body that was hit, for shadow rays that leave it, and of whatever body they meet.
+  std::vector<std::optional<State>> shadow_states;
+  std::vector<RealisationMemory> shadow_realisations;
   const BlockPoints* points = nullptr;
   int bounce = 0;
   Rng* rng = nullptr;
@@ -93,10 +91,7 @@ struct PathTracer::Impl {
 };
 
 PathTracer::PathTracer(const Scene& scene, const std::atomic<bool>* stop)
-    : impl_(std::make_unique<Impl>(scene)) {
-  for (Line& line : impl_->lines) line.stop_when(stop);
-  for (Line& line : impl_->shadow_lines) line.stop_when(stop);
-}
+    : impl_(std::make_unique<Impl>(scene, stop)) {}
 PathTracer::~PathTracer() = default;
 
 PathSample PathTracer::trace(const Ray& camera_ray, double t_max, const BlockPoints& points,
@@ -115,12 +110,7 @@ PathSample PathTracer::Impl::trace(const Ray& camera_ray, double t_max) {
   Ray ray = camera_ray;
   Color throughput{1, 1, 1};
   double scatter_pdf = kInfinity;
-  for (std::size_t i = 0; i < memory.size(); ++i) {
-    memory[i].reset();
-    if (scene.stochastic[i].surface.memory() == Memory::global) realisations[i] = {(*rng)(), {}};
-    segments[i].segments.clear();
-  }
-  std::fill(inside.begin(), inside.end(), 0);
+  path.begin_path(*rng);
 
   for (bounce = 0;; ++bounce) {
     Vertex v;
@@ -164,33 +154,43 @@ PathSample PathTracer::Impl::trace(const Ray& camera_ray, double t_max) {
       throughput *= 1 / brightest;
     }
     // The segment that ends here ends in what is known of every process here.
-    for (std::size_t i = 0; i < memory.size(); ++i)
-      if (memory[i] && met[i] && scene.stochastic[i].surface.memory() == Memory::segments)
-        scene.stochastic[i].surface.keep_end(v.position, *memory[i], segments[i]);
+    for (const int b : path.entered()) {
+      const TreeSurface& surface = scene.bodies[b].surface;
+      if (surface.memory() != Memory::segments) continue;
+      for (std::size_t k = 0; k < surface.leaves().size(); ++k)
+        if (const std::optional<State>& state = path.states(b)[k])
+          surface.leaves()[k].keep_end(v.position, *state, path.segments(b)[k]);
+    }
     ray = {v.start(next->transmitted), next->direction};
-    if (next->transmitted && v.body >= 0) inside[v.body] = !inside[v.body];
+    if (next->transmitted && v.body >= 0) path.cross(v.body);
     scatter_pdf = next->pdf;
   }
   return result;
 }
 
-TreeHit PathTracer::Impl::first_hit(const Scene::Impl::Body& body, bool from_inside,
-                                    Line* body_lines, const Ray& ray, double t_max,
-                                    const PathMemory& remembered,
-                                    std::vector<RealisationMemory>& kept, Rng& random) {
-  const std::size_t count = body.surface.leaves().size();
+TreeHit PathTracer::Impl::first_hit(int b, bool from_inside, std::span<Line> drawn, const Ray& ray,
+                                    double t_max, States remembered,
+                                    std::span<RealisationMemory> kept, Rng& random) {
+  const TreeSurface& surface = scene.bodies[b].surface;
+  const std::size_t count = surface.leaves().size();
   if (from_inside) ++counters->inside_rays;
   for (std::size_t k = 0; k < count; ++k) {
-    const std::size_t i = body.first + k;
-    const State* state = remembered[i] ? &*remembered[i] : nullptr;
-    starts[k] = body.surface.leaves()[k].start_from(state, from_inside, &kept[i], &segments[i]);
+    const State* state = remembered[k] ? &*remembered[k] : nullptr;
+    starts[k] = surface.leaves()[k].start_from(state, from_inside, &kept[k], &path.segments(b)[k]);
   }
-  return body.surface.first_hit(march, {body_lines, count}, ray, t_max, {starts.data(), count},
-                                random, *counters);
+  return surface.first_hit(march, drawn, ray, t_max, {starts.data(), count}, random, *counters);
+}
+
+std::span<Line> PathTracer::Impl::take_lines(int b) {
+  first_line[b] = lines_taken;
+  lines_taken += scene.bodies[b].surface.leaves().size();
+  while (lines.size() < lines_taken) lines.emplace_back().stop_when(stop);
+  return lines_of(b);
 }
 
 // The first surface along the ray: meshes bound the march through each process; the first of the
-// first hits wins (union of independent processes, definitions B5).
+// first hits wins (union of independent processes, definitions B5). The nearest body comes first,
+// so that those behind a hit are not entered.
 bool PathTracer::Impl::closest(const Ray& ray, double t_max, Vertex& v) {
   MeshHit mesh;
   const auto [start, end] = within_reach(ray, t_max);
@@ -199,24 +199,24 @@ bool PathTracer::Impl::closest(const Ray& ray, double t_max, Vertex& v) {
   const bool hit_mesh =
       scene.triangles && scene.triangles->intersect(ray, nearest, mesh, *counters);
   if (hit_mesh) nearest = mesh.t;
-  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
-    const Scene::Impl::Body& body = scene.bodies[b];
-    const auto [enter, leave] = clip(body.surface.bounds(), ray.origin, ray.direction, 0, nearest);
-    for (std::size_t k = 0; k < body.surface.leaves().size(); ++k)
-      met[body.first + k] = enter <= leave;
-    if (enter > leave) continue;
-    const TreeHit hit =
-        first_hit(body, inside[b], &lines[body.first], ray, nearest, memory, realisations, *rng);
-    if (!(hit.t < nearest)) continue;
-    nearest = hit.t;
-    v.surface = static_cast<int>(body.first) + hit.leaf;
-    v.body = static_cast<int>(b);
-  }
+  path.begin_ray();
+  lines_taken = 0;
+  scene.body_boxes.visit(ray, nearest, queue, [&](int b) {
+    path.enter(b);
+    const TreeHit hit = first_hit(b, path.inside(b), take_lines(b), ray, nearest, path.states(b),
+                                  path.realisations(b), *rng);
+    if (hit.t < nearest) {
+      nearest = hit.t;
+      v.surface = static_cast<int>(scene.bodies[b].first) + hit.leaf;
+      v.body = b;
+    }
+    return nearest;
+  });
   if (scene.transparent) leave_bounds(ray, nearest);
   if (v.surface >= 0) {
     v.t = nearest;
     v.position = v.departure = v.beyond = ray.at(nearest);
-    v.inside = inside[v.body];
+    v.inside = path.inside(v.body);
     v.material = scene.stochastic[v.surface].material;
     if (v.inside) v.material = &v.material->from_inside();
     if (const auto& albedo = scene.stochastic[v.surface].albedo) {
@@ -241,12 +241,12 @@ bool PathTracer::Impl::closest(const Ray& ray, double t_max, Vertex& v) {
 // The ray is inside no more of bodies whose bounds it leaves before t: where there is no surface,
 // no index changes (definitions B4).
 void PathTracer::Impl::leave_bounds(const Ray& ray, double t) {
-  for (std::size_t b = 0; b < inside.size(); ++b) {
-    if (!inside[b]) continue;
+  for (const int b : path.begun()) {
+    if (!path.inside(b)) continue;
     const auto [enter, leave] =
         clip(scene.bodies[b].surface.bounds(), ray.origin, ray.direction, 0, t);
     if (enter <= leave && leave >= t) continue;
-    inside[b] = false;
+    path.cross(b);
     ++counters->bounds_exits;
   }
 }
@@ -254,67 +254,69 @@ void PathTracer::Impl::leave_bounds(const Ray& ray, double t) {
 // Keeps the state of every leaf that was sampled at the vertex, save the one that was hit
 // (definitions B1); all else is forgotten.
 void PathTracer::Impl::remember_others(const Vertex& v) {
-  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
-    const Scene::Impl::Body& body = scene.bodies[b];
-    const ProcessTree& tree = body.surface.tree();
-    bool hit = false;
-    for (std::size_t k = 0; k < tree.leaves().size(); ++k) {
-      const std::size_t i = body.first + k;
-      memory[i].reset();
-      const ProcessSurface& surface = scene.stochastic[i].surface;
-      if (static_cast<int>(i) == v.surface) hit = true;
-      if (!met[i] || static_cast<int>(i) == v.surface || surface.memory() == Memory::none) continue;
-      if (surface.sampled_at(lines[i], v.t))
-        memory[i] = surface.state(surface.value(lines[i], v.t, *rng), {});
+  path.forget();
+  for (const int b : path.entered()) {
+    const TreeSurface& body = scene.bodies[b].surface;
+    const ProcessTree& tree = body.tree();
+    const std::span<Line> drawn = lines_of(b);
+    const States states = path.states(b);
+    const int hit = v.body == b ? v.surface - static_cast<int>(scene.bodies[b].first) : -1;
+    for (std::size_t k = 0; k < states.size(); ++k) {
+      states[k].reset();
+      const ProcessSurface& surface = body.leaves()[k];
+      if (static_cast<int>(k) == hit || surface.memory() == Memory::none) continue;
+      if (surface.sampled_at(drawn[k], v.t))
+        states[k] = surface.state(surface.value(drawn[k], v.t, *rng), {});
     }
     const int sign = tree.sign(tree.root(), [&](int k) {
-      const std::optional<State>& state = memory[body.first + k];
-      return !state ? 0 : state->value * tree.leaves()[k].sign > 0 ? 1 : -1;
+      return !states[k] ? 0 : states[k]->value * tree.leaves()[k].sign > 0 ? 1 : -1;
     });
-    const bool wrong = !hit && (inside[b] ? sign > 0 : sign < 0);
+    const bool wrong = hit < 0 && (path.inside(b) ? sign > 0 : sign < 0);
     if (wrong) ++counters->states_inside;
-    for (std::size_t k = 0; k < tree.leaves().size(); ++k) {
-      const std::size_t i = body.first + k;
-      if (wrong) memory[i].reset();
-      counters->states_remembered += memory[i].has_value();
-      const ProcessSurface& surface = scene.stochastic[i].surface;
-      if (memory[i] && surface.memory() != Memory::renewal)
-        memory[i] =
-            surface.state(memory[i]->value, draw(surface.gradient_law(lines[i], v.t, *rng)));
+    for (std::size_t k = 0; k < states.size(); ++k) {
+      if (wrong) states[k].reset();
+      counters->states_remembered += states[k].has_value();
+      const ProcessSurface& surface = body.leaves()[k];
+      if (states[k] && surface.memory() != Memory::renewal)
+        states[k] =
+            surface.state(states[k]->value, draw(surface.gradient_law(drawn[k], v.t, *rng)));
     }
   }
 }
 
 // What was drawn of every process on the way, memory `segments`.
 void PathTracer::Impl::keep_segments(const Vertex& v) {
-  for (std::size_t i = 0; i < memory.size(); ++i) {
-    const ProcessSurface& surface = scene.stochastic[i].surface;
-    if (met[i] && surface.memory() == Memory::segments)
-      surface.keep_segment(lines[i], v.t, segments[i]);
+  for (const int b : path.entered()) {
+    const TreeSurface& body = scene.bodies[b].surface;
+    if (body.memory() != Memory::segments) continue;
+    for (std::size_t k = 0; k < body.leaves().size(); ++k)
+      body.leaves()[k].keep_segment(lines_of(b)[k], v.t, path.segments(b)[k]);
   }
 }
 
-// 0 or 1, a fresh sample of every process under shadow_memory. `crossed`: the body that the ray
-// starts through the surface of, or -1.
-bool PathTracer::Impl::visible(const Ray& ray, double distance, int crossed) {
+// 0 or 1, a fresh sample of every process under what is remembered, of the body that was hit under
+// shadow_states. `transmitted`: the ray starts through the surface of that body.
+bool PathTracer::Impl::visible(const Ray& ray, double distance, const Vertex& v, bool transmitted) {
   ++counters->shadow_rays;
   if (scene.triangles && scene.triangles->occluded(ray, distance, *counters)) return false;
-  shadow_realisations = realisations;
-  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
-    const Scene::Impl::Body& body = scene.bodies[b];
-    const auto [enter, leave] = clip(body.surface.bounds(), ray.origin, ray.direction, 0, distance);
-    if (enter > leave) continue;
-    const bool from_inside = inside[b] != (static_cast<int>(b) == crossed);
-    if (first_hit(body, from_inside, shadow_lines.data(), ray, distance, shadow_memory,
-                  shadow_realisations, *light_rng)
-            .t < distance)
-      return false;
-  }
-  return true;
+  bool free = true;
+  scene.body_boxes.visit(ray, distance, queue, [&](int b) {
+    path.meet(b);
+    const auto seen = path.realisations(b);
+    shadow_realisations.assign(seen.begin(), seen.end());
+    const bool from_inside = path.inside(b) != (transmitted && b == v.body);
+    const States states = b == v.body ? States(shadow_states) : path.states(b);
+    const std::span<Line> drawn = std::span(shadow_lines).first(states.size());
+    const TreeHit hit =
+        first_hit(b, from_inside, drawn, ray, distance, states, shadow_realisations, *light_rng);
+    free = !(hit.t < distance);
+    return free ? distance : -1;
+  });
+  return free;
 }
 
-// Next-event estimation. `remember(direction, memory)` puts the state of the surface that was hit
-// into the copy of the memory that the shadow ray starts with.
+// Next-event estimation. `remember(direction, states)` puts the state of the surface that was hit
+// into the copy of its body's memory that the shadow ray starts with.
 template <class Scatter, class Remember>
 Color PathTracer::Impl::sample_lights(const Vertex& v, const Scatter& scatter,
                                       const Remember& remember) {
@@ -326,11 +328,13 @@ Color PathTracer::Impl::sample_lights(const Vertex& v, const Scatter& scatter,
     if (!light) continue;
     const Color f = scatter.eval(light->direction);
     if (!(max_component(f) > 0)) continue;
-    shadow_memory = memory;
-    remember(light->direction, shadow_memory);
+    if (v.body >= 0) {
+      const States states = path.states(v.body);
+      shadow_states.assign(states.begin(), states.end());
+      remember(light->direction, shadow_states);
+    }
     const bool transmitted = scatter.transmitted(light->direction);
-    if (!visible({v.start(transmitted), light->direction}, light->distance,
-                 transmitted ? v.body : -1))
+    if (!visible({v.start(transmitted), light->direction}, light->distance, v, transmitted))
       continue;
     const double weight =
         light->delta() ? 1 : balance(light->pdf, scatter.pdf(light->direction)) / light->pdf;
@@ -347,13 +351,13 @@ std::optional<ScatterSample> PathTracer::Impl::scatter_at(const Ray& ray, const 
     const SurfaceScatter scatter(*v.material, ray.direction, v.geometric_normal, v.shading_normal,
                                  v.tint);
     normal = v.shading_normal;
-    if (!scatter.specular()) direct = sample_lights(v, scatter, [](const Vec3&, PathMemory&) {});
+    if (!scatter.specular()) direct = sample_lights(v, scatter, [](const Vec3&, States) {});
     return scatter.sample(point(kDirectionDecision, *rng));
   }
   const Scene::Impl::Body& body = scene.bodies[v.body];
-  const auto here = [&](auto& of) { return std::span(of).subspan(body.first); };
   const TreeHit hit{v.t, v.surface - static_cast<int>(body.first)};
-  const HitGradient found(body.surface, here(lines), hit, here(memory), *rng, *counters);
+  const HitGradient found(body.surface, lines_of(v.body), hit, path.states(v.body), *rng,
+                          *counters);
   const GradientLaw& law = found.law();
   Vec3 gradient = law.mean;
   if (!law.certain()) {
@@ -361,13 +365,13 @@ std::optional<ScatterSample> PathTracer::Impl::scatter_at(const Ray& ray, const 
     gradient += law.b1 * xi1 + law.b2 * xi2;
     counters->line_normals += 2;
   }
-  found.remember(gradient, here(memory));
+  found.remember(gradient, path.states(v.body));
   ++counters->states_remembered;
   normal = normalize(gradient) * (v.inside ? -1 : 1);
   if (v.material->specular() && !law.degenerate) {  // normals have a density to light them by
     const auto lit = [&](const auto& way) {
-      return sample_lights(v, way, [&](const Vec3& w, PathMemory& m) {
-        found.remember(*way.gradient_for(w), here(m));
+      return sample_lights(v, way, [&](const Vec3& w, States states) {
+        found.remember(*way.gradient_for(w), states);
       });
     };
     if (v.material->relative_index() == 0) {
@@ -382,7 +386,7 @@ std::optional<ScatterSample> PathTracer::Impl::scatter_at(const Ray& ray, const 
     }
   }
   const SurfaceScatter scatter(*v.material, ray.direction, normal, normal, v.tint);
-  if (!scatter.specular()) direct = sample_lights(v, scatter, [](const Vec3&, PathMemory&) {});
+  if (!scatter.specular()) direct = sample_lights(v, scatter, [](const Vec3&, States) {});
   return scatter.sample(point(kDirectionDecision, *rng));
 }
 

@@ -86,6 +86,9 @@ Scene::Scene(SceneDescription description)
   for (const MaterialDescription& m : d.materials) impl_->materials.push_back(make_material(m));
   build_objects();
   if (impl_->triangles) impl_->triangles->commit();
+  std::vector<Box3> boxes;
+  for (const auto& body : impl_->bodies) boxes.push_back(body.surface.bounds());
+  impl_->body_boxes = BoxTree(boxes);
   impl_->radius = bounding_radius(*impl_);
   for (const LightDescription& l : d.lights) impl_->lights.add(make_light(l), l.visible_to_camera);
   if (!d.world.black()) impl_->lights.add(make_world(d.world), true);

@@ -1,6 +1,7 @@
 // The parts of a planned scene, for the integrator (integrator/path_tracer.cpp).
 #pragma once
 
+#include "geometry/box_tree.h"
 #include "geometry/triangle_scene.h"
 #include "light/light_set.h"
 #include "material/material.h"
@@ -29,6 +30,7 @@ struct Scene::Impl {
       instance_materials;  // by instance of `triangles`, then material_index
   std::vector<Stochastic> stochastic;
   std::vector<Body> bodies;
+  BoxTree body_boxes;        // their bounds
   bool transparent = false;  // rays travel inside some of the bodies
   LightSet lights;
   double radius = 1;  // of the scene's bounding sphere
