@@ -65,6 +65,26 @@ def test_the_plot_shows_every_round_where_it_belongs(plot):
     assert blue.any(axis=0).sum() > 0.6 * plot.SIZE and np.argmax(blue.any(axis=0)) > 40
 
 
+def test_equal_distances_of_the_plot_are_equal_factors(plot):
+    """Dots at 1, 2 and 8 seconds, where the curve is higher than its line: the second a third of the way."""
+    picture = plot.picture(history((1, 0.04), (2, 0.02), (8, 0.005)))
+    dots = np.flatnonzero((picture[..., 2] > 0.9).sum(axis=0) >= 5)
+    first, second, third = (group.mean() for group in np.split(dots, np.flatnonzero(np.diff(dots) > 1) + 1))
+    assert (second - first) / (third - first) == pytest.approx(1 / 3, abs=0.02)
+
+
+def test_the_grey_line_halves_the_error_in_four_times_the_seconds(plot):
+    """From the last dot of an error of 20 % that does not fall: at the first, a quarter of the seconds, it is at twice that."""
+    picture = plot.picture(history((1, 0.04), (4, 0.04)))
+    red, blue = picture[..., 0], picture[..., 2]
+    curve = np.flatnonzero((blue > 0.9).any(axis=1)).mean()
+    [ten_percent] = np.flatnonzero((np.abs(red - 0.2) < 1e-3).mean(axis=1) > 0.6)  # a line of the grid
+    dots = np.flatnonzero((blue > 0.9).sum(axis=0) >= 5)
+    grey = (np.ptp(picture[..., :3], axis=-1) < 0.01) & (red > 0.25) & (red < 0.5)
+    above = np.flatnonzero(grey[:, dots[0] : dots[0] + 6].any(axis=1))
+    assert above.mean() - curve == pytest.approx(curve - ten_percent, abs=4)
+
+
 @pytest.mark.parametrize("seconds", [(1e-3, 2e-3), (1, 1.001), (0.5, 90_000), (3, 7200)])
 def test_the_plot_takes_any_history(plot, seconds):
     for errors in ((1e-8, 1e-9), (4.0, 2.0), (0.01, 0.01), (1e3, 1e3), (1e4, 1e-14)):
