@@ -84,3 +84,32 @@ def test_objects_out_of_reach_change_nothing(memory, seed):
     np.testing.assert_array_equal(few.passes["combined"], many.passes["combined"])
     counters = [{name: n for name, n in r.stats.items() if isinstance(n, int)} for r in (few, many)]
     assert counters[0] == counters[1]
+
+
+@pytest.mark.parametrize("material", ["lambert", "mirror", "dielectric"])
+@pytest.mark.parametrize("memory", ["renewal", "renewal+", "global", "global-1"])
+def test_a_path_leaves_nothing_behind_for_the_next(memory, material, seed):
+    """Samples drawn after others are those drawn alone, to the bit, where bodies overlap and remember each other."""
+    description = crowd([(0.5 * x, 0.5 * y, 0) for x in range(2) for y in range(2)], 1, [LAMP], max_bounces=5)
+    description["materials"]["Body"] = {"type": material} | ({"ior": 1.5} if material == "dielectric" else {})
+    planned = gn.Scene(description)
+    parts = [
+        gn.render(planned, 6, 6, samples=n, first_sample=k, seed=seed, memory=memory, threads=1)
+        for k, n in ((0, 32), (0, 16), (16, 16))
+    ]
+    np.testing.assert_array_equal(parts[0].passes["combined"], gn.merge(parts[1:]).passes["combined"])
+
+
+def test_each_object_has_a_realisation_of_its_own(seed):
+    """Two hazes in one place, memory global: independent, so a ray passes both with the square of the chance."""
+    haze = gn.GaussianProcess(gn.ConstantField(0.03), 0.05, gn.SquaredExponential(0.5), bounds=((-1,) * 3, (1,) * 3))
+    missed = []
+    for n in (1, 2):
+        description = scene(haze, max_bounces=0)
+        description["camera"] = {"type": "orthographic", "matrix": description["camera"]["matrix"], "width": 1.9}
+        description["objects"] = [description["objects"][0] | {"name": str(i)} for i in range(n)]
+        stats = gn.render(gn.Scene(description), 16, 16, samples=32, seed=seed, memory="global").stats
+        missed.append(1 - stats["path_vertices"] / stats["camera_paths"])
+    error = np.sqrt(sum(d**2 * p * (1 - p) / 8192 for p, d in zip(missed, (2 * missed[0], 1), strict=True)))
+    assert 0.1 < missed[0] < 0.9
+    assert abs(missed[1] - missed[0] ** 2) < 5 * error
