@@ -90,11 +90,14 @@ def test_objects_out_of_reach_change_nothing(memory, seed):
 @pytest.mark.parametrize("memory", ["renewal", "renewal+", "global", "global-1"])
 def test_a_path_leaves_nothing_behind_for_the_next(memory, material, seed):
     """To the bit: a pixel whose blocks of samples are drawn one after the other, and each by itself. Bodies overlap, so that
-    they remember each other; one that the camera does not see stands in the lamp's light."""
+    they remember each other; a haze that the camera does not see stands in the lamp's light."""
     beside = np.eye(4)
     beside[:3, 3] = 6, 0, 0.5
     places = [(0.5 * x, 0.5 * y, 0) for x in range(2) for y in range(2)] + [(1.1, 0, 0)]
     description = crowd(places, 1, [LAMP | {"matrix": beside}], max_bounces=5)
+    description["objects"][-1]["process"] = gn.GaussianProcess(
+        gn.ConstantField(0.06), 0.05, gn.SquaredExponential(0.5), bounds=((2.2, -2, -2), (5, 2, 2))
+    )
     description["materials"]["Body"] = {"type": material} | ({"ior": 1.5} if material == "dielectric" else {})
     planned = gn.Scene(description)
 
