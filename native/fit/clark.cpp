@@ -1,17 +1,9 @@
 #include "fit/clark.h"
 
+#include "fit/gauss_legendre.h"
+
 namespace gpis {
 namespace {
-
-// Nodes and weights of Gauss-Legendre on (0, 1), 10 of 20: the others mirror them.
-constexpr double kNode[10] = {0.0034357004074525, 0.0180140363610431, 0.0438827858743371,
-                              0.0804415140888906, 0.1268340467699246, 0.1819731596367425,
-                              0.2445664990245865, 0.3131469556422902, 0.3861070744291775,
-                              0.4617367394332513};
-constexpr double kWeight[10] = {0.0088070035695761, 0.0203007149001935, 0.0313360241670545,
-                                0.0416383707883524, 0.0509650599086202, 0.0590972659807592,
-                                0.0658443192245883, 0.0710480546591910, 0.0745864932363019,
-                                0.0763766935653629};
 
 // P(X <= h, Y <= k) of two standard normals with correlation r: Plackett's integral over the
 // correlation, in asin r (Drezner and Wesolowsky 1990).
@@ -21,9 +13,9 @@ double bivariate_cdf(double h, double k, double r) {
   double sum = 0;
   if (r != 0) {
     const double angle = std::asin(r);
-    for (int i = 0; i < 20; ++i) {
-      const double s = std::sin(angle * (i < 10 ? kNode[i] : 1 - kNode[i - 10]));
-      sum += kWeight[i % 10] * std::exp(-(h * h + k * k - 2 * h * k * s) / (2 * (1 - s * s)));
+    for (int i = 0; i < gauss::kNodes; ++i) {
+      const double s = std::sin(angle * gauss::node(i));
+      sum += gauss::weight(i) * std::exp(-(h * h + k * k - 2 * h * k * s) / (2 * (1 - s * s)));
     }
     sum *= angle / (2 * kPi);
   }
@@ -86,7 +78,7 @@ double normal_density(double x) {
   return std::exp(-0.5 * x * x) / std::sqrt(2 * kPi);
 }
 
-Greatest greatest(const Jet& a, const Jet& b, double covariance) {
+Greatest greatest(const Jet& a, const Jet& b, double covariance, bool shape) {
   const double va = a.sigma * a.sigma, vb = b.sigma * b.sigma;
   // By the deviations, so that ν² keeps its digits where the two are almost one variable.
   const double r = va * vb > 0 ? std::clamp(covariance / (a.sigma * b.sigma), -1.0, 1.0) : 0.0;
@@ -117,8 +109,8 @@ Greatest greatest(const Jet& a, const Jet& b, double covariance) {
   const double deviation = std::sqrt(out.variance);
   out.skewness =
       deviation > 0 ? (m3 - 3 * m1 * m2 + 2 * m1 * m1 * m1) / (out.variance * deviation) : 0;
-  out.first_wins = wa.probability;
-  out.kolmogorov = distance(a, b, covariance, out.mean, deviation);
+  out.first_share = wa.probability;
+  out.kolmogorov = shape ? distance(a, b, covariance, out.mean, deviation) : 0;
 
   // ∇f = γ + β (X - m) + a part of covariance R that is independent of all values.
   Vec3 gradient, with_value;

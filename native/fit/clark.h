@@ -8,14 +8,14 @@ namespace gpis {
 
 struct Greatest {
   double mean, variance, skewness, kolmogorov;
-  double first_wins;  // probability that the first is the greater
+  double first_share;  // E[∂F/∂(the first)]: the probability that it is the greater
   Jet jet;
 };
 
 // `covariance` of the two values. Exact; a second variable that is the first plus a constant, or
-// two certain ones, are no special case. `kolmogorov`: distance to the normal distribution of the
-// same mean and variance, over 65 points.
-Greatest greatest(const Jet& a, const Jet& b, double covariance);
+// two certain ones, are no special case. `kolmogorov`, if `shape` is asked for: distance to the
+// normal distribution of the same mean and variance, over 65 points.
+Greatest greatest(const Jet& a, const Jet& b, double covariance, bool shape);
 
 // Standard normal distribution function and density.
 double normal_cdf(double x);

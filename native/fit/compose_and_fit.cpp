@@ -40,9 +40,6 @@ void check(const TreePtr& tree, const FitQuery& query) {
   if (!(std::abs(query.correlation) <= 1))
     refuse("correlation is ", query.correlation, "; it takes -1 to 1.");
   if (!(query.certainty >= 3)) refuse("certainty is ", query.certainty, "; it takes 3 or more.");
-  if (query.closed_form && tree->has_blends())
-    refuse("method 'closed_form' takes hard unions, intersections and differences, not ",
-           tree->describe(), ": take method 'sample'.");
 }
 
 class Fitter {
@@ -62,7 +59,7 @@ class Fitter {
     for (const std::size_t n : sampled) plan.voxels_drawn += n;
     plan.seconds = 3 * counting;
     const double threads = arena_.max_concurrency();
-    if (plan.voxels_drawn > 0 && !query_.closed_form) {
+    if (plan.voxels_drawn > 0) {
       const auto fullest = std::max_element(sampled.begin(), sampled.end());
       const int tile = static_cast<int>(fullest - sampled.begin());
       Fit scratch = empty_fit();
@@ -73,9 +70,12 @@ class Fitter {
         return thread_seconds() - begin;
       };
       time(2);  // opens what is opened once
-      const double few = time(2), more = time(10);
-      plan.seconds += std::max(more - few, 0.0) / 8 / static_cast<double>(*fullest) *
-                      static_cast<double>(plan.voxels_drawn) * query_.realisations / threads;
+      const double few = time(2), more = query_.closed_form ? few : time(10);
+      const double realisation = std::max(more - few, 0.0) / 8;
+      const double tile_seconds =
+          std::max(few - 2 * realisation, 0.0) + realisation * query_.realisations;
+      plan.seconds += tile_seconds / static_cast<double>(*fullest) *
+                      static_cast<double>(plan.voxels_drawn) / threads;
     }
     const double leaves = composition_.leaves(), sources = composition_.sources();
     const double tile = double(TileWorker::kSize[0]) * TileWorker::kSize[1] * TileWorker::kSize[2];

@@ -1,6 +1,7 @@
 #include "fit/composition.h"
 
 #include "field/check.h"
+#include "fit/blend_moments.h"
 
 namespace gpis {
 namespace {
@@ -157,7 +158,8 @@ Composition::Alive Composition::alive(const Jet* leaves, double certainty) const
   return out;
 }
 
-Composition::Partial Composition::fold(int node, const Jet* jets, const Alive& alive) const {
+Composition::Partial Composition::fold(int node, const Jet* jets, const Alive& alive,
+                                       bool shape) const {
   const ProcessTree::Node& n = tree_->nodes()[node];
   if (n.kind == Kind::leaf) {
     const Jet& jet = jets[n.leaf];
@@ -172,7 +174,7 @@ Composition::Partial Composition::fold(int node, const Jet* jets, const Alive& a
   bool first = true;
   for (const int child : n.children) {
     if (!(alive.nodes & bit(child))) continue;
-    const Partial part = fold(child, jets, alive);
+    const Partial part = fold(child, jets, alive, shape);
     if (first) {
       best = part;
       first = false;
@@ -180,22 +182,24 @@ Composition::Partial Composition::fold(int node, const Jet* jets, const Alive& a
     }
     double covariance = 0;
     for (int s = 0; s < sources(); ++s) covariance += best.along[s] * part.along[s];
-    const Jet &a = best.greatest.jet, &b = part.greatest.jet;
-    Greatest g = least ? greatest(negated(a), negated(b), covariance) : greatest(a, b, covariance);
+    Jet a = best.greatest.jet, b = part.greatest.jet;
+    if (least) a = negated(a), b = negated(b);
+    Greatest g = n.blend > 0 ? smooth_greatest(a, b, covariance, n.blend, shape)
+                             : greatest(a, b, covariance, shape);
     if (least) {
       g.mean = -g.mean;
       g.skewness = -g.skewness;
       g.jet = negated(g.jet);
     }
     for (int s = 0; s < sources(); ++s)
-      best.along[s] = g.first_wins * best.along[s] + (1 - g.first_wins) * part.along[s];
+      best.along[s] = g.first_share * best.along[s] + (1 - g.first_share) * part.along[s];
     best.greatest = g;
   }
   return best;
 }
 
-Greatest Composition::closed_form(const Jet* leaves, const Alive& alive) const {
-  return fold(tree_->root(), leaves, alive).greatest;
+Greatest Composition::closed_form(const Jet* leaves, const Alive& alive, bool shape) const {
+  return fold(tree_->root(), leaves, alive, shape).greatest;
 }
 
 }  // namespace gpis

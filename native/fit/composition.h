@@ -38,9 +38,10 @@ class Composition {
     std::uint64_t nodes = 0, leaves = 0;
   };
   Alive alive(const Jet* leaves, double certainty) const;
-  // F by Clark's formulas from the leaves that are alive: exact for one or two of them without a
-  // blend, else each result is taken for normal and carried on, as Clark does.
-  Greatest closed_form(const Jet* leaves, const Alive& alive) const;
+  // F by Clark's formulas, and those of smooth unions, from the leaves that are alive: exact for
+  // one or two of them, else each result is taken for normal and carried on, as Clark does. Without
+  // `shape` there is no Kolmogorov distance.
+  Greatest closed_form(const Jet* leaves, const Alive& alive, bool shape) const;
 
   // Covariance of g of two leaves at one point.
   double correlation(int a, int b) const;
@@ -63,7 +64,7 @@ class Composition {
   };
   bool above(int a, int b, const Jet* leaves, double certainty, double margin) const;
   void mark(int node, const Jet* leaves, double certainty, Alive& out) const;
-  Partial fold(int node, const Jet* leaves, const Alive& alive) const;
+  Partial fold(int node, const Jet* leaves, const Alive& alive, bool shape) const;
 
   TreePtr tree_;
   double correlation_;

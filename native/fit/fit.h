@@ -18,7 +18,7 @@ struct FitQuery {
   int resolution = 64;  // nodes along the longest side, the first and last on its ends
   int realisations = 1000;
   std::uint64_t seed = 0;
-  bool closed_form = false;  // by Clark's formulas: nothing is drawn
+  bool closed_form = false;  // by Clark's formulas and those of blends: nothing is drawn
   double correlation = 0;    // of the operands' noises: 0 independent, 1 shared
   // A leaf that loses by more than this many standard deviations is left out. The mean is then off
   // by less than 6e-8 of that deviation at 5; infinite: everything is drawn.

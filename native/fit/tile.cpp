@@ -89,7 +89,7 @@ void TileWorker::prepare(Fit& fit, std::size_t node, const std::array<int, 3>& o
                          const Vec3& x, const Composition::Alive& alive) {
   for (int l = 0; l < composition_.leaves(); ++l)
     if (alive.leaves >> l & 1) jets_[l] = composition_.jet(l, x);
-  const Greatest closed = composition_.closed_form(jets_.data(), alive);
+  const Greatest closed = composition_.closed_form(jets_.data(), alive, query_.closed_form);
   if (query_.closed_form) {
     write(fit, node, closed.jet);
     fit.skewness[node] = static_cast<float>(closed.skewness);

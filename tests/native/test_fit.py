@@ -45,9 +45,10 @@ class Pairs:
 
         self.operands = [gn.GaussianProcess(field(m), field(s), sheets) for m, s in zip(self.m, self.s, strict=True)]
 
-    def fit(self, n, seed, **options):
-        options = {"correlation": self.r, "certainty": np.inf} | options
-        fit = gn.compose_and_fit(self.operands, "union", self.bounds, self.m.shape[1], n, seed, **options)
+    def fit(self, n, seed, blend=0.0, **options):
+        options = {"correlation": self.r, "certainty": np.inf, "blend": blend} | options
+        op = "smooth_union" if blend else "union"
+        fit = gn.compose_and_fit(self.operands, op, self.bounds, self.m.shape[1], n, seed, **options)
         return {k: v if k in ("counters", "origin", "voxel_size") else v[:, 0, 0] for k, v in fit.items()}
 
     def clark(self):
@@ -77,6 +78,42 @@ def test_closed_form_of_nearly_one_variable():
             assert np.all(np.abs(fit["anisotropy"][..., :3] - 16) < 1e-2)
 
 
+def by_quadrature(pairs, blend, h=0.02):
+    """Moments 1 to 3 of the smooth least (mean, deviation, skewness) by sums over the plane of the two normals."""
+    x = np.arange(-8, 8 + h / 2, h)
+    weight = np.multiply.outer(phi(x), phi(x)) * h * h
+    out = []
+    for (m1, m2), (s1, s2) in zip(pairs.m.T, pairs.s.T, strict=True):
+        a = (m1 + s1 * x)[:, None]
+        b = m2 + s2 * (pairs.r * x[:, None] + np.sqrt(1 - pairs.r**2) * x)
+        f = np.minimum(a, b) - np.maximum(blend - np.abs(a - b), 0) ** 2 / (4 * blend)
+        mean = np.sum(weight * f)
+        second, third = (np.sum(weight * (f - mean) ** k) for k in (2, 3))
+        out.append((mean, np.sqrt(second), third / second**1.5))
+    return np.array(out).T
+
+
+@pytest.mark.parametrize("blend", [0.05, 0.6, 5.0])
+def test_closed_form_of_a_smooth_union(blend, seed):
+    """Against sums over the plane; with a certain operand, of one noise, and as the radius goes to 0."""
+    for r in (-1.0, -0.6, 0.0, 0.8, 0.999, 1.0):
+        pairs = Pairs(seed, r, 6)
+        fit = pairs.fit(2, 0, blend, method="closed_form")
+        assert fit["counters"]["voxels_drawn"] == 0
+        for name, expected, error in zip(("mean", "sigma", "skewness"), by_quadrature(pairs, blend), (1, 1, 5), strict=True):
+            np.testing.assert_allclose(fit[name], expected, atol=2e-5 * error, err_msg=f"{name}, r = {r}")
+        hard = pairs.fit(2, 0, 1e-7, method="closed_form")
+        for name, exact in zip(("mean", "sigma"), pairs.clark(), strict=True):
+            np.testing.assert_allclose(hard[name], exact, atol=2e-5)
+    flat, rough = gn.GaussianProcess(0.1, 0.0, SE(1.0)), gn.GaussianProcess(0.3, 0.2, SE(1.0))
+    fit = gn.compose_and_fit([flat, rough], "smooth_union", BOX, 2, 2, method="closed_form", blend=blend)
+    x = np.linspace(-8, 8, 400_001)
+    b = 0.3 + 0.2 * x
+    f = np.minimum(0.1, b) - np.maximum(blend - np.abs(0.1 - b), 0) ** 2 / (4 * blend)
+    mean = np.sum(f * phi(x)) * (x[1] - x[0])
+    np.testing.assert_allclose(fit["mean"], mean, atol=1e-6)
+
+
 @pytest.mark.stats
 def test_two_hundred_random_pairs(full_size, seed):
     """Issue 5, 1: mean and deviation within 4 standard errors at n = 1,000, errors falling as 1/√n."""
@@ -100,17 +137,19 @@ def test_two_hundred_random_pairs(full_size, seed):
 
 
 @pytest.mark.stats
-def test_shape_of_the_distribution(seed):
+@pytest.mark.parametrize("blend", [0.0, 0.7])
+def test_shape_of_the_distribution(blend, seed):
     """Skewness and Kolmogorov distance against samples that numpy draws."""
     rng = np.random.default_rng(seed)
     n = 100_000
     for r in (-0.6, 0.0, 0.8, 1.0):
         pairs = Pairs(seed, r, 6)
-        exact, sampled = pairs.fit(2, 0, method="closed_form"), pairs.fit(20_000, seed)
+        exact, sampled = pairs.fit(2, 0, blend, method="closed_form"), pairs.fit(20_000, seed, blend)
         for node in range(6):
             g = rng.normal(size=(2, n))
             g[1] = r * g[0] + np.sqrt(1 - r**2) * g[1]
-            f = np.sort(np.minimum(*(pairs.m[k][node] + pairs.s[k][node] * g[k] for k in range(2))))
+            a, b = (pairs.m[k][node] + pairs.s[k][node] * g[k] for k in range(2))
+            f = np.sort(np.minimum(a, b) - (np.maximum(blend - np.abs(a - b), 0) ** 2 / (4 * blend) if blend else 0))
             y = (f - f.mean()) / f.std()
             check_z(exact["skewness"][node], np.mean(y**3), 6 / np.sqrt(n))
             check_z(sampled["skewness"][node], exact["skewness"][node], 6 / np.sqrt(20_000))
@@ -127,25 +166,26 @@ def slopes(fit):
     return inverse + np.einsum("x...ij,y...ji->...xy", change, change) / 8
 
 
-def crease():
-    """Two operands whose difference depends on x alone, deviations that vary, length scales of their own."""
+def crease(kernel=None):
+    """Two operands whose difference depends on x alone, deviations that vary, length scales of their own (or one kernel)."""
     a = gn.GaussianProcess(
         gn.PlaneField([0, 0, 0], [0.6, 0.3, 0]),
         (0.4 + 0.2 * gn.PlaneField([0, 0, 0], [1, 0, 0])).clamped(0.05, 5),
-        SE([0.6, 0.3, 0.9]),
+        kernel or SE([0.6, 0.3, 0.9]),
     )
-    b = gn.GaussianProcess(gn.PlaneField([0, 0, 0], [-0.6, 0.3, 0]), 0.3, SE(0.4))
+    b = gn.GaussianProcess(gn.PlaneField([0, 0, 0], [-0.6, 0.3, 0]), 0.3, kernel or SE(0.4))
     return a, b
 
 
 @pytest.mark.stats
-@pytest.mark.parametrize("op", ["union", "difference", "smooth_union"])
+@pytest.mark.parametrize("op", ["union", "difference", "smooth_union", "smooth_union of one noise"])
 def test_moments_against_explicit_realisations(op, seed):
     """numpy composes values and gradients of realisations at points: mean, deviation, and the covariance of gradients."""
-    a, b = crease()
+    op, *one_noise = op.split(" of ")
+    a, b = crease(SE(0.4)) if one_noise else crease()
     points = np.array([[-0.5, 0, 0], [0, 0, 0], [0.25, 0.5, -0.5]])
     n, blend = 12_000, 0.3 if op == "smooth_union" else 0.0
-    fa, fb = (gp.realisation_at(points, seed=seed + k * n, n=n) for k, gp in enumerate((a, b)))
+    fa, fb = (gp.realisation_at(points, seed=seed + (0 if one_noise else k * n), n=n) for k, gp in enumerate((a, b)))
     (va, ga), (vb, gb) = ((f["value"], f["gradient"]) for f in (fa, fb))
     if op == "difference":
         va, ga, vb, gb = -va, -ga, vb, gb  # max(a, -b) = -min(-a, b)
@@ -156,11 +196,11 @@ def test_moments_against_explicit_realisations(op, seed):
     g = np.where(lower, ga, gb) * (1 - share) + np.where(lower, gb, ga) * share
     if op == "difference":
         f, g = -f, -g
-    methods = ["sample"] if blend else ["sample", "closed_form"]
     m = 4000
-    for method in methods:
+    for method in ("sample", "closed_form"):
         # Central differences of A are compared: small voxels.
-        fit = gn.compose_and_fit([a, b], op, BOX, 17, m, seed, method=method, blend=blend)
+        correlation = 1.0 if one_noise else 0.0
+        fit = gn.compose_and_fit([a, b], op, BOX, 17, m, seed, method=method, blend=blend, correlation=correlation)
         index = tuple(np.round((points + 1) / fit["voxel_size"]).astype(int).T)
         count = n if method == "closed_form" else min(n, m) / 2
         check_z(fit["mean"][index], f.mean(axis=0), f.std(axis=0) / np.sqrt(count), method)

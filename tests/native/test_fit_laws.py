@@ -170,7 +170,6 @@ def test_a_fit_is_a_process(tmp_path, seed):
         ({"bounds": ((0, 0, 0), (1, 0, 1))}, "every side must be finite and of positive length"),
         ({"realisations": 1}, "realisations is 1; it takes 2 to 1e8"),
         ({"method": "guess"}, "method is 'guess'; it takes 'sample' or 'closed_form'"),
-        ({"op": "smooth_union", "blend": 0.1, "method": "closed_form"}, "takes hard unions"),
         ({"blend": 0.1}, "blend is 0.1: it is the radius of op 'smooth_union' alone"),
         ({"correlation": 1.5}, "correlation is 1.5; it takes -1 to 1"),
         ({"correlation": 0.5, "operands": [sphere(0, 1, 0.1), sphere(0, 1, 0.1, SE(0.2))]}, "takes operands of one kernel"),
