@@ -1,7 +1,5 @@
 """Sample & Compose → Fit: one GPIS with the moments of an object and its operands, as a new Volume."""
 
-import threading
-
 import bpy
 import numpy as np
 from bpy.props import EnumProperty, IntProperty
@@ -9,13 +7,14 @@ from bpy.props import EnumProperty, IntProperty
 from ..bake import files
 from ..native import native
 from ..sync import Sync, gpis
+from .work import Working
 
 METHODS = (
     ("SAMPLE", "Sample", "Draw realisations of all operands together, compose each of them, and sum up", 0),
     (
         "CLOSED_FORM",
         "Closed Form",
-        "Clark's formulas: at once, exact for two operands; further ones as if the result so far were normal",
+        "By formulas: at once, exact for two operands; further ones as if the result so far were normal",
         1,
     ),
 )
@@ -101,7 +100,7 @@ def make_volume(context, obj, fit, sentence):
     settings.memory = obj.gpis.memory
     settings.enabled = True
     fitted.display_type = "BOUNDS"
-    fitted.gpis_csg.quality = sentence
+    fitted.gpis_csg.quality, fitted.gpis_csg.fitted_from = sentence, obj
     obj.hide_render = True
     for other in context.selected_objects:
         other.select_set(False)
@@ -189,106 +188,29 @@ class GPIS_OT_csg_fit(_Fit, bpy.types.Operator):
         return bpy.ops.gpis.csg_fit_run(how, **values)
 
 
-class GPIS_OT_csg_fit_run(_Fit, bpy.types.Operator):
+class GPIS_OT_csg_fit_run(_Fit, Working, bpy.types.Operator):
     """Fit one GPIS to the object and its operands; Esc cancels"""
 
     bl_idname = "gpis.csg_fit_run"
     bl_label = "Fit GPIS"
     bl_options = {"INTERNAL", "UNDO"}
+    doing = "Fitting a GPIS"
+    cancelled = "The fit was cancelled."
 
-    def execute(self, context):
-        return self._finish(context, self._start(context, wait=True))
+    def prepare(self, context):
+        query, seed = self.query(context), self.seed
+        self._query = query
+        return lambda progress: query.run(seed, progress)
 
-    def invoke(self, context, event):
-        self._work = self._start(context, wait=False)
-        if self._work is None:
-            return {"CANCELLED"}
-        manager = context.window_manager
-        self._timer = manager.event_timer_add(0.1, window=context.window)
-        manager.progress_begin(0, 100)
-        manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
-
-    def modal(self, context, event):
-        work = self._work
-        if event.type == "ESC" and event.value == "PRESS":
-            work.cancel()
-        if event.type != "TIMER":
-            # The scene waits: the fit is of what it was when it began.
-            return {"RUNNING_MODAL"}
-        context.window_manager.progress_update(100 * work.fraction)
-        context.workspace.status_text_set(f"Fitting a GPIS: {work.fraction:.0%}  (Esc: cancel)")
-        if work.running():
-            return {"RUNNING_MODAL"}
-        self._stop(context)
-        return self._finish(context, work)
-
-    def cancel(self, context):
-        self._work.cancel()
-        self._work.join()
-        self._stop(context)
-
-    def _stop(self, context):
-        context.window_manager.event_timer_remove(self._timer)
-        context.window_manager.progress_end()
-        context.workspace.status_text_set(None)
-
-    def _start(self, context, wait):
-        try:
-            work = _Work(self.query(context), self.seed)
-        except (ValueError, RuntimeError, OSError) as error:
-            self.report({"ERROR"}, str(error))
-            return None
-        if wait:
-            work.join()
-        return work
-
-    def _finish(self, context, work):
-        if work is None:
-            return {"CANCELLED"}
-        if work.error is not None:
-            self.report({"ERROR"}, str(work.error))
-            return {"CANCELLED"}
-        if work.result is None:
-            self.report({"INFO"}, "The fit was cancelled.")
-            return {"CANCELLED"}
-        obj = work.query.owner
-        sentence = summary(work.result, self.realisations, self.method)
-        first, *others = work.query.materials
+    def finish(self, context, result):
+        obj = self._query.owner
+        sentence = summary(result, self.realisations, self.method)
+        first, *others = self._query.materials
         if any(other != first for other in others):
             sentence += f' All of it has the material of "{obj.name}"; those of other operands are not kept.'
-        fitted = make_volume(context, obj, work.result, sentence)
+        fitted = make_volume(context, obj, result, sentence)
         self.report({"INFO"}, f'"{fitted.name}" is fitted; "{obj.name}" is no longer rendered itself. {sentence}')
         return {"FINISHED"}
-
-
-class _Work:
-    """A fit in a thread of its own: the native module lets go of Python meanwhile."""
-
-    def __init__(self, query, seed):
-        self.query, self.fraction, self.result, self.error = query, 0.0, None, None
-        self._cancelled = False
-        self._thread = threading.Thread(target=self._run, args=(seed,), daemon=True)
-        self._thread.start()
-
-    def _run(self, seed):
-        try:
-            self.result = self.query.run(seed, self._progress)
-        except Exception as error:  # told by whoever looks: a thread has nobody to raise to
-            self.error = error
-
-    def _progress(self, fraction):
-        self.fraction = fraction
-        return not self._cancelled
-
-    def running(self):
-        return self._thread.is_alive()
-
-    def cancel(self):
-        self._cancelled = True
-
-    def join(self):
-        self._thread.join()
 
 
 _CLASSES = (GPIS_OT_csg_fit, GPIS_OT_csg_fit_run)

@@ -62,6 +62,10 @@ class GPIS_PT_csg(bpy.types.Panel):
             layout.operator("gpis.csg_fit", icon="VOLUME_DATA")
         if settings.quality:
             wrapped(layout.column(align=True), context, settings.quality)
+        if settings.fitted_from is not None:
+            layout.operator("gpis.csg_compare", icon="IMAGE_DATA")
+        if settings.comparison:
+            wrapped(layout.column(align=True), context, settings.comparison)
 
 
 _CLASSES = (GPIS_UL_csg, GPIS_PT_csg)

@@ -67,6 +67,8 @@ class GPIS_CSGProperties(bpy.types.PropertyGroup):
         update=_tag,
     )
     quality: StringProperty(name="Fit", description="How well the fit says what was composed")
+    fitted_from: PointerProperty(name="Fitted From", description="The GPIS to whose list this was fitted", type=bpy.types.Object)
+    comparison: StringProperty(name="Comparison", description="What a render of the list and one of the fit have shown")
 
 
 _CLASSES = (GPIS_CSGItem, GPIS_CSGProperties)

@@ -87,8 +87,8 @@ def of_line_and_slope(length, g, i, fraction, across, directions, rng):
 
 
 def explicit(scene, everything, n, rng):
-    """Of rays whose first point is outside: the share that hits, and t of the second hit of those, by realisations of which the
-    second ray sees everything, or the values and gradients at the first hit alone."""
+    """Of rays whose first point is outside: the share that hits; of those the slope of F along the second ray, and t where that
+    hits, by realisations of which the second ray sees everything, or the values and gradients at the first hit alone."""
     leaves, lengths, shared = SCENES[scene]
     g = draw(leaves, shared, n, rng)
     f = np.stack([leaf.values(x) for leaf, x in zip(leaves, g, strict=True)], axis=-1)
@@ -108,7 +108,8 @@ def explicit(scene, everything, n, rng):
         gradient.append(unit(position - CENTERS[k]) + leaf.sigma * slope[k])
     at_hit = [np.linalg.norm(position - c, axis=1) - RADIUS + leaf.sigma * v for c, leaf, v in zip(CENTERS, leaves, value, strict=True)]
     weights = blended(np.stack(at_hit, axis=-1))[1]
-    directions = cosine(sum(weights[:, k, None] * gradient[k] for k in range(2)), rng)
+    normal = sum(weights[:, k, None] * gradient[k] for k in range(2))
+    directions = cosine(normal, rng)
     points = position[:, None] + X[:, None] * directions[:, None]
     second, drawn = [], None
     for k, (leaf, length) in enumerate(zip(leaves, lengths, strict=True)):
@@ -121,14 +122,14 @@ def explicit(scene, everything, n, rng):
     hit, j, part = crossing(blended(np.stack(second, axis=-1))[0])
     t = np.full(len(row), np.inf)
     t[hit] = X[j] + part * STEP
-    return len(row) / len(f), t
+    return len(row) / len(f), np.sum(normal * directions, axis=1), t
 
 
 @pytest.mark.parametrize("memory", ["renewal+", "global-1", "global"])
 @pytest.mark.parametrize("scene", SCENES)
 def test_second_hits_of_explicit_realisations(scene, memory, n, seed):
     rng = np.random.default_rng(seed)
-    share, t = explicit(scene, memory != "renewal+", n, rng)
+    share, slope, t = explicit(scene, memory != "renewal+", n, rng)
     assert 0.2 < np.isfinite(t).mean() < 0.8
     tree = tree_of(scene)
     found = gn.first_hits(tree, *rays(n), 4, memory=memory, seed=seed)
@@ -138,17 +139,20 @@ def test_second_hits_of_explicit_realisations(scene, memory, n, seed):
     start = take(found["state"], hit)
     second = gn.first_hits(tree, found["position"][hit], directions, 4, memory=memory, start=start, seed=seed + 1)
     check_same_distribution(second["t"], t, f"{scene}, {memory}: t of the second hit")
-    # Short flights by themselves: what a wrong start changes first.
-    for most in (0.05, 0.2):
-        p = np.mean(t < most)
-        check_proportion(np.sum(second["t"] < most), hit.sum(), p, np.sqrt(p * (1 - p) / len(t)), f"{scene}, {memory}: t < {most}")
+    # By the slope at the start, which a ray that had forgotten it would not depend on.
+    ours = np.sum(found["gradient"][hit] * directions, axis=1)
+    check_same_distribution(ours, slope, f"{scene}, {memory}: slope")
+    ends = np.quantile(slope, [0, 0.2, 0.5, 1]) + [-9, 0, 0, 9]
+    for low, high in zip(ends[:-1], ends[1:], strict=True):
+        pair = second["t"][(ours > low) & (ours <= high)], t[(slope > low) & (slope <= high)]
+        check_same_distribution(*pair, f"{scene}, {memory}: t after slopes {low:.2f} to {high:.2f}")
 
 
 @pytest.mark.parametrize("memory", ["renewal+", "global"])
 @pytest.mark.parametrize("scene", SCENES)
 def test_light_after_one_bounce(scene, memory, n, seed):
     """The renderer on the same ray, direct light of a white world alone: what misses, and what is free after the first hit."""
-    share, t = explicit(scene, memory != "renewal+", 2 * n, np.random.default_rng(seed))
+    share, _, t = explicit(scene, memory != "renewal+", 2 * n, np.random.default_rng(seed))
     expected = 1 - share * np.isfinite(t).mean()
     forward = np.eye(4)
     forward[:3, :3] = np.array([[0, 0, -1], [0, 1, 0], [1, 0, 0]])  # looks along x
