@@ -64,10 +64,12 @@ def summary(fit, realisations, method):
             f"{fit['skewness'][where].min():.2g} to {fit['skewness'][where].max():.2g}."
         )
     else:
-        lines.append("Near the surface one operand wins everywhere: the fit is exact.")
+        lines.append("Near the surface one operand wins everywhere: mean and σ are exact.")
     lengths = np.sqrt(np.linalg.eigvalsh(_matrices(fit["anisotropy"][near])))
     if len(lengths):
         lines.append(f"Length scales {lengths.min():.2g} to {lengths.max():.2g}.")
+        if lengths.min() < 1.001 * fit["voxel_size"]:
+            lines.append("The shortest are those of a voxel: a higher resolution keeps shorter ones.")
     if counters["length_scales_limited"]:
         lines.append(f"At {counters['length_scales_limited']:,} voxels they were brought into one voxel to 4 diagonals.")
     return " ".join(lines)
@@ -185,7 +187,11 @@ class GPIS_OT_csg_fit(_Fit, bpy.types.Operator):
     def execute(self, context):
         how = "EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT"
         values = {name: getattr(self, name) for name in ("resolution", "realisations", "seed", "method")}
-        return bpy.ops.gpis.csg_fit_run(how, **values)
+        try:
+            return bpy.ops.gpis.csg_fit_run(how, **values)
+        except RuntimeError as error:  # what the other operator has reported, which Blender raises here
+            self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
+            return {"CANCELLED"}
 
 
 class GPIS_OT_csg_fit_run(_Fit, Working, bpy.types.Operator):

@@ -3,6 +3,7 @@
 import bpy
 from bpy.props import EnumProperty, IntProperty
 
+from ..sync.csg import reaches
 from .properties import OPERATIONS
 
 
@@ -11,23 +12,17 @@ def lists_with(obj):
     return [other for other in bpy.data.objects if any(item.object == obj for item in other.gpis_csg.items)]
 
 
-def reaches(obj, target):
-    """Whether `target` is `obj` or somewhere in its list, or in those of its operands."""
-    seen, waiting = set(), [obj]
-    while waiting:
-        one = waiting.pop()
-        if one == target:
-            return True
-        if one.name_full not in seen:
-            seen.add(one.name_full)
-            waiting.extend(item.object for item in one.gpis_csg.items if item.object is not None)
-    return False
+def show_as_operand(obj):
+    """As bounds, and so the mesh it was made of."""
+    obj.display_type = "BOUNDS"
+    if obj.gpis.source is not None:
+        obj.gpis.source.display_type = "BOUNDS"
 
 
 def release(obj):
-    """An operand of no list any more is rendered by itself again."""
-    if obj is not None and not lists_with(obj):
-        obj.hide_render = False
+    """An operand of no list any more is rendered by itself again, for it is none; its mesh is seen again."""
+    if obj is not None and obj.gpis.source is not None and not lists_with(obj):
+        obj.gpis.source.display_type = "WIRE"
 
 
 class _ListOperator:
@@ -71,8 +66,7 @@ class GPIS_OT_csg_add(_ListOperator, bpy.types.Operator):
             item.operation = self.operation
             if operand is not None:
                 item.object = operand
-                operand.display_type = "BOUNDS"
-                operand.hide_render = True
+                show_as_operand(operand)
         settings.active = len(settings.items) - 1
         obj.update_tag()
         return {"FINISHED"}

@@ -6,7 +6,7 @@ accept, a SyncError where it is not.
 
 import re
 
-from . import camera, gpis, lights, meshes, settings, world
+from . import camera, csg, gpis, lights, meshes, settings, world
 from .state import Sync, SyncError
 
 __all__ = ["Sync", "SyncError", "describe", "explain"]
@@ -22,8 +22,10 @@ def describe(depsgraph, width, height, view=None):
     sync.description["settings"] = settings.describe(sync)
     sync.description["camera"] = camera.describe(sync, width, height) if view is None else view
     sync.description["world"] = world.describe(sync)
+    operands = csg.operands(depsgraph.scene)
     for instance in depsgraph.object_instances:
-        if instance.show_self and not (view is not None and instance.object.hide_render):
+        hidden = view is not None and instance.object.hide_render
+        if instance.show_self and not hidden and instance.object.name_full not in operands:
             _add(sync, instance.object, instance.matrix_world)
     return sync
 

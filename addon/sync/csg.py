@@ -13,6 +13,32 @@ def used(settings):
     return [item for item in items if item.solo] or items
 
 
+def reaches(obj, target):
+    """Whether `target` is `obj` or somewhere in its list, or in those of its operands."""
+    seen, waiting = set(), [obj]
+    while waiting:
+        one = waiting.pop()
+        if one.name_full == target.name_full:
+            return True
+        if one.name_full not in seen:
+            seen.add(one.name_full)
+            waiting.extend(item.object for item in one.gpis_csg.items if item.object is not None)
+    return False
+
+
+def operands(scene):
+    """Names of the objects in the lists of the scene's GPIS objects: parts of these, and none of their own. (What Blender
+    hides in renders it would not evaluate either: an operand that is moved would stand still in an animation.) Objects
+    whose lists lead back to themselves are no operands, so that compose() finds them."""
+    return {
+        item.object.name_full
+        for obj in scene.objects
+        if obj.type == "VOLUME" and obj.gpis.enabled
+        for item in obj.gpis_csg.items
+        if item.object is not None and not reaches(item.object, obj)
+    }
+
+
 class Composed:
     """A process or tree, the names of its leaves' materials, and the box around it (min, max)."""
 

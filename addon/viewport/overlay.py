@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 
 from ..paint import bake
+from ..sync import csg
 from . import channels, draw, legend, sampling, surface
 from .areas import tag_redraw
 
@@ -57,12 +58,15 @@ def tool_is_active(context):
 
 
 def _shown(context):
-    """The GPIS objects of the view."""
+    """The GPIS objects of the view, but operands, which are drawn as bounds unless they are at work."""
     space = context.space_data
     if space is None or space.type != "VIEW_3D" or not space.overlay.show_overlays or space.shading.type == "RENDERED":
         return
+    operands = csg.operands(context.scene)
     for obj in context.view_layer.objects:
-        if obj.type == "VOLUME" and obj.gpis.enabled and obj.visible_get(viewport=space):
+        if obj.type != "VOLUME" or not obj.gpis.enabled or not obj.visible_get(viewport=space):
+            continue
+        if obj.name_full not in operands or obj == context.active_object:
             yield obj
 
 

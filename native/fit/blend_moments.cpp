@@ -89,7 +89,7 @@ double kolmogorov(const Difference& d, double mean, double deviation, bool certa
     if (probability < 1e-8) return;
     // The node stands for values that are spread over its part of z.
     const double rise = step * (d.share(z) * d.ca + (1 - d.share(z)) * d.cb);
-    const double s = std::sqrt(d.residual + 0 * rise);
+    const double s = std::sqrt(d.residual + rise * rise / 12);
     parts.push_back({probability, d.value(z), 1 / std::max(s, 1e-12 * deviation)});
   });
   const auto off = [&](double x) {

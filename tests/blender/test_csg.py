@@ -57,7 +57,7 @@ def test_add_selected(operands, describe):
     build(a, ["UNION", "DIFFERENCE"])
     assert {item.object for item in a.gpis_csg.items} == {b, c}
     for operand in (b, c):
-        assert operand.display_type == "BOUNDS" and operand.hide_render
+        assert operand.display_type == "BOUNDS"
     entry, _ = entry_of(describe)  # the operands are no longer objects of their own
     assert entry["name"] == "A"
     order = [item.object.name for item in a.gpis_csg.items]
@@ -66,7 +66,26 @@ def test_add_selected(operands, describe):
     bpy.ops.gpis.csg_remove()
     assert len(a.gpis_csg.items) == 1
     freed = b if a.gpis_csg.items[0].object == c else c
-    assert not freed.hide_render
+    assert sorted(entry["name"] for entry in describe()[0]) == sorted(["A", freed.name])
+    bpy.data.objects.remove(a)
+    assert len(describe()[0]) == 2  # operands of nobody
+
+
+def test_operands_move_in_an_animation(operands, tmp_path):
+    """Blender does not evaluate for a render what it hides there."""
+    a, b, c = operands
+    build(a, ["UNION", "UNION"])
+    b.location = (0, 0, 0)
+    b.keyframe_insert("location", frame=1)
+    b.location = (2, 0, 0)
+    b.keyframe_insert("location", frame=2)
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end, scene.gpis.samples, scene.render.filepath = 1, 2, 1, str(tmp_path / "frame")
+    scene.render.engine = "GPIS"
+    support.image_settings(scene)
+    bpy.ops.render.render(animation=True)
+    inside, outside = (support.read_exr(path)[0]["B"] for path in sorted(tmp_path.glob("*.exr")))
+    assert inside.mean() > outside.mean() + 0.01  # b is green, before a white world
 
 
 def test_operands_keep_their_places(operands, describe):
