@@ -98,16 +98,12 @@ def image_of(name, pixels):
 
 
 def show(context, image):
-    """In an Image Editor that is open, else in a window of its own, as renders are."""
+    """In an Image Editor, where one is open."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "IMAGE_EDITOR":
                 area.spaces.active.image = image
                 return
-    bpy.ops.wm.window_new()
-    area = context.window_manager.windows[-1].screen.areas[0]
-    area.type = "IMAGE_EDITOR"
-    area.spaces.active.image = image
 
 
 class GPIS_OT_csg_compare(Working, bpy.types.Operator):
@@ -141,8 +137,7 @@ class GPIS_OT_csg_compare(Working, bpy.types.Operator):
         settings = self._fitted.gpis_csg
         settings.comparison = sentence(*result, self.samples, gain)
         image = image_of(f"{self._fitted.name}: Live, Fitted, Difference", pixels)
-        if not bpy.app.background:
-            show(context, image)
+        show(context, image)
         self.report({"INFO"}, f'Image "{image.name}". {settings.comparison}')
         return {"FINISHED"}
 
