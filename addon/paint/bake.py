@@ -209,24 +209,19 @@ def _wanted(opened, brush, dabs, i):
     """The box that a dab needs where it is more than there is, else None."""
     low, high = np.array(opened.bounds())
     size = (high - low).max()
-    center = dabs.centers[i].astype(np.float64)
-    centers = [center]
-    for axis in np.flatnonzero(brush.symmetry):
-        sign = np.ones(3)
-        sign[axis] = -1
-        centers += [place * sign for place in centers]
+    centers = strokes.mirrored(dabs.centers[i : i + 1].astype(np.float64), brush.symmetry)
     beyond = max(np.max([low - centers, centers - high]), 0)
     if beyond > _MOST_DISTANCE * size:
         raise ValueError(
-            f"A dab at ({', '.join(f'{part:.3g}' for part in center)}) is {beyond:.3g} away from the grid, which is "
+            f"A dab at ({', '.join(f'{part:.3g}' for part in centers[0])}) is {beyond:.3g} away from the grid, which is "
             f"{size:.3g} long: paint on the surface, or extend the grid first."
         )
     if brush.channel not in _EXTENDING:
         return None
     reach = min(float(dabs.radii[i]), _MOST_REACH * size)
     box = (
-        np.min([low, *(place - reach for place in centers)], axis=0),
-        np.max([high, *(place + reach for place in centers)], axis=0),
+        np.min([low, *(centers - reach)], axis=0),
+        np.max([high, *(centers + reach)], axis=0),
     )
     return box if np.any(box[0] < low) or np.any(box[1] > high) else None
 

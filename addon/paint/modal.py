@@ -114,7 +114,6 @@ class GPIS_OT_paint(_InView, bpy.types.Operator):
         if self._painting is None:
             return {"CANCELLED"}  # beside the surface; passed on, the drag would move the object
         _active = self
-        overlay.painting(obj, self.fields)
         self._move(context, event)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
@@ -153,8 +152,9 @@ class GPIS_OT_paint(_InView, bpy.types.Operator):
             if found is None:
                 return  # off the surface: the stroke goes on where it comes back
             location = found.location
-        self._painting.add(self._spacing.add(location, _pressure(event)))
-        overlay.painting(obj, self.fields)
+        dabs = self._spacing.add(location, _pressure(event))
+        self._painting.add(dabs)
+        overlay.painting(obj, self.fields, dabs, self._painting.stroke.brush.symmetry)
         brush = context.scene.gpis.paint
         said = value_text(context.scene, brush, self.fields, location, self._radius)
         context.area.header_text_set(f"{self._painting.stroke.brush.operation.title()}   {said}   {_KEYS}")

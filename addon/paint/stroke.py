@@ -96,6 +96,13 @@ class Dabs:
         return cls(values[: 3 * count], values[3 * count : 4 * count], values[4 * count : 5 * count], directions)
 
 
+def mirrored(centers, symmetry):
+    """Places (N, 3) and then their mirror images."""
+    for axis in np.flatnonzero(symmetry):
+        centers = np.concatenate([centers, centers * np.where(np.arange(3) == axis, -1.0, 1.0)])
+    return centers
+
+
 @dataclass
 class Stroke:
     brush: Brush

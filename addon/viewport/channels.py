@@ -7,7 +7,7 @@ import numpy as np
 from . import colour
 
 # Ellipses of the bumps, over the whole surface; sides of one.
-_ELLIPSES, _SIDES = 1500, 12
+_ELLIPSES, SIDES = 1500, 12
 
 
 @dataclass
@@ -28,23 +28,35 @@ class View:
 
 
 def shown(scene, brush, fields, vertices, before=None):
-    """The View of the brush's channel at these points. `before`: a legend whose ends stay, as a stroke goes on."""
+    """The View of the brush's channel at these points. `before`: a legend whose ends stay, as a stroke goes on, unless
+    there are values beyond them."""
     if brush.channel == "ALBEDO":
         return View(_display(fields.values("albedo", vertices)), None)
     if brush.channel in {"DEVIATION", "LENGTH_SCALE"}:
         deviation = brush.channel == "DEVIATION"
         values = fields.values(brush.channel.lower(), vertices)
-        low, high = before.span if before else colour.log_range(values, brush.sigma if deviation else brush.length_scale)
+        own = brush.sigma if deviation else brush.length_scale
+        low, high = colour.widened(before.span, values) if before else colour.log_range(values, own)
         title = "Deviation σ" if deviation else "Length Scale ℓ"
         texts = [colour.length(scene, value) for value in (low, np.sqrt(low * high), high)]
         return View(colour.of(colour.log_parts(values, low, high)), Legend(title, *texts, (low, high)))
     if brush.channel == "ANISOTROPY":
         values = ratio(fields.values("anisotropy", vertices))
-        low, high = before.span if before else (1.0, max(2.0, float(values.max()), _longest(brush.ratios)))
+        own = (1.0, max(2.0, float(values.max(initial=0)), _longest(brush.ratios)))
+        low, high = colour.widened(before.span, values) if before else own
         texts = [f"{value:.3g} : 1" for value in (low, np.sqrt(low * high), high)]
         legend = Legend("Longest : shortest", *texts, (low, high))
         return View(colour.of(colour.log_parts(values, low, high)), legend)
     return View(None, None)
+
+
+def holds(legend, brush):
+    """Whether what the brush paints has a place on the legend."""
+    value = {"DEVIATION": brush.sigma, "LENGTH_SCALE": brush.length_scale, "ANISOTROPY": _longest(brush.ratios)}
+    if legend is None or brush.channel not in value:
+        return True
+    low, high = legend.span
+    return (1 - 1e-6) * low <= value[brush.channel] <= (1 + 1e-6) * high
 
 
 def _longest(ratios):
@@ -67,32 +79,35 @@ def ratio(entries):
     return np.sqrt(squares[:, 2] / np.maximum(squares[:, 0], 1e-300))
 
 
-def ellipses(fields, surface):
-    """Ends (2 N, 3) of lines around sections of the bumps, each through its two longest directions, on a part of the
-    vertices: combed bumps are needles, discs are round."""
-    vertices, normals = surface.vertices, surface.normals
-    chosen = np.random.default_rng(0).permutation(len(vertices))[:_ELLIPSES]
-    a = matrices(fields.values("anisotropy", vertices[chosen]))
-    normal = normals[chosen]
+def some_vertices(surface):
+    """Indices of the vertices at which bumps are drawn."""
+    return np.random.default_rng(0).permutation(len(surface.vertices))[:_ELLIPSES]
+
+
+def ellipses(fields, surface, chosen):
+    """Lines (N, SIDES, 2, 3) around sections of the bumps at the chosen vertices, each through its two longest
+    directions: combed bumps are needles, discs are round. And (N,) whether there is one to be seen."""
+    vertices, normal = surface.vertices[chosen], surface.normals[chosen]
+    a = matrices(fields.values("anisotropy", vertices))
     # Where two lengths are nearly alike either direction is right, and that in the surface is seen best.
     least = 0.01 * np.trace(a, axis1=1, axis2=2)[:, None, None]
     squares, vectors = np.linalg.eigh(a - least * normal[:, :, None] * normal[:, None, :])
     lengths = np.sqrt(np.maximum(squares, 0))
     # None where it is as long in every direction: arbitrary axes would look like painted ones.
     strength = np.clip(lengths[:, 2] / np.maximum(lengths[:, 0], 1e-300) - 1, 0, 1)
-    strength[strength < 0.05] = 0
     half = float(np.linalg.norm(surface.high - surface.low)) / 100 * strength / lengths[:, 2]
     first, second = (vectors[:, :, i] * (half * lengths[:, i])[:, None] for i in (2, 1))
-    lifted = vertices[chosen] + 0.1 * np.linalg.norm(first, axis=1, keepdims=True) * normal
-    angle = np.linspace(0, 2 * np.pi, _SIDES + 1)[:, None, None]
-    around = (lifted + np.cos(angle) * first + np.sin(angle) * second)[:, strength > 0]
-    return np.stack([around[:-1], around[1:]], axis=2).transpose(1, 0, 2, 3).reshape(-1, 3)
+    lifted = vertices + 0.1 * np.linalg.norm(first, axis=1, keepdims=True) * normal
+    angle = np.linspace(0, 2 * np.pi, SIDES + 1)[:, None, None]
+    around = lifted + np.cos(angle) * first + np.sin(angle) * second
+    return np.stack([around[:-1], around[1:]], axis=2).transpose(1, 0, 2, 3), strength >= 0.05
 
 
-def moved(fields, surface):
-    """The vertices on the mean surface as it is now: a step of Newton along the gradient as it was."""
-    square = np.sum(surface.gradients**2, axis=1, keepdims=True)
-    return surface.vertices - fields.values("mean", surface.vertices)[:, None] * surface.gradients / np.maximum(square, 1e-12)
+def moved(fields, surface, at=slice(None)):
+    """The vertices `at` on the mean surface as it is now: a step of Newton along the gradient as it was."""
+    vertices, gradients = surface.vertices[at], surface.gradients[at]
+    square = np.sum(gradients**2, axis=1, keepdims=True)
+    return vertices - fields.values("mean", vertices)[:, None] * gradients / np.maximum(square, 1e-12)
 
 
 def pins(conditions, surface):

@@ -40,6 +40,17 @@ def log_range(values, *others):
     return low, high
 
 
+def widened(span, values):
+    """A range that holds these values too, with room for more of them, as each change of it recolours all."""
+    low, high = span
+    least, most = float(values.min(initial=np.inf)), float(values.max(initial=0))
+    if 0 < least < 0.99 * low:
+        low = least / 2
+    if 1.01 * high < most < np.inf:
+        high = 2 * most
+    return low, high
+
+
 def log_parts(values, low, high):
     return np.log(np.maximum(values, 1e-300) / low) / np.log(high / low)
 

@@ -4,49 +4,58 @@ import bpy
 import numpy as np
 
 from ..paint import bake
+from ..paint.stroke import Dabs
 from ..sync import csg
 from . import channels, draw, legend, sampling, surface
 from .areas import tag_redraw
+from .look import Look
 
-GREY = (0.72, 0.72, 0.72)
-_SHELLS = ((1.0, (0.35, 0.65, 1.0)), (-1.0, (1.0, 0.55, 0.25)))
+_SHELLS = ((0.35, 0.65, 1.0), (1.0, 0.55, 0.25))  # at +σ, at -σ
 _SHELL_OPACITY = 0.22
 _ELLIPSES = (0.05, 0.05, 0.05, 0.9)
 _PINS = (1.0, 0.35, 0.1, 1.0)
 
-# The stroke that is being painted: (name of the object, its live fields), or None; and how often it went on.
+# The stroke that is being painted: (name of the object, its live fields, symmetry), or None; and its dabs since the
+# object was drawn last.
 _live = None
-_step = 0
+_new = Dabs()
 # name of the object -> _Drawn; made again when what it shows has changed.
 _drawn = {}
 _handles = []
 
 
 class _Drawn:
-    """Batches of one object, and the key of what they show."""
+    """Batches of one object, what they show and the key of that."""
 
-    def __init__(self, key):
-        self.key = key
-        self.batch = None
-        self.shells = []
-        self.ellipses = np.empty((0, 3))
+    def __init__(self, key, look, shape, found):
+        self.key, self.look = key, look
         self.pins = np.empty((0, 3))
-        self.legend = None
+        self._shape, self._found = shape, found
+        self.fill()
+
+    def fill(self):
+        shape, found, look = self._shape, self._found, self.look
+        self.batch = draw.surface_batch(look.vertices, shape.normals, shape.triangles, look.colours)
+        self.ellipses = look.ellipses
+        self.shells = [
+            draw.surface_batch(vertices, found.normals, found.triangles, np.broadcast_to(tint, vertices.shape))
+            for vertices, tint in zip(look.shells, _SHELLS, strict=False)
+        ]
 
 
-def painting(obj, fields):
-    """Show these fields for the object, as they are now, until `painted`."""
-    global _live, _step
-    _live = (obj.name, fields)
-    _step += 1
+def painting(obj, fields, dabs, symmetry):
+    """Show these fields for the object, as they are now, until `painted`. `dabs`: what changed since the last call."""
+    global _live, _new
+    _live, _new = (obj.name, fields, symmetry), _new + dabs
     tag_redraw()
 
 
 def painted():
-    global _live
+    """The stroke is over: what is shown is made again as a whole."""
+    global _live, _new
     if _live is not None:
         _drawn.pop(_live[0], None)
-    _live = None
+    _live, _new = None, Dabs()
     tag_redraw()
 
 
@@ -90,12 +99,14 @@ def _draw_pixels():
     context = bpy.context
     obj = context.active_object
     drawn = _drawn.get(obj.name) if obj is not None else None
-    if drawn is not None and drawn.legend is not None and tool_is_active(context) and obj in set(_shown(context)):
-        legend.draw_legend(context, drawn.legend)
+    if drawn is not None and drawn.look.legend is not None and tool_is_active(context) and obj in set(_shown(context)):
+        legend.draw_legend(context, drawn.look.legend)
 
 
 def _refreshed(context, obj, found):
-    """What is drawn of an object, made again where its file, its settings or what the tool shows have changed."""
+    """What is drawn of an object: made again where its file, its settings or what the tool shows have changed, and in
+    part where a stroke went on."""
+    global _new
     brush = context.scene.gpis.paint
     active = obj == context.active_object and tool_is_active(context)
     live = _live is not None and _live[0] == obj.name
@@ -106,35 +117,28 @@ def _refreshed(context, obj, found):
     key = (
         found.path,
         active and (brush.channel, brush.show_channel, brush.show_shells, brush.show_axes),
-        active and (settings.sigma, settings.length_scale, settings.sigma_source, settings.anisotropy),
+        active and (settings.sigma, settings.length_scale, settings.anisotropy, settings.use_albedo),
+        active and (settings.sigma_source, settings.sigma_grid, settings.sigma_meaning, settings.sigma_factor),
         tuple(settings.ratios) + tuple(settings.rotation) + tuple(settings.infinite),
         len(settings.conditions),
-        live and _step,
         sampled and sampled.key,
     )
     drawn = _drawn.get(obj.name)
-    if drawn is not None and drawn.key == key:
+    known = drawn is not None and (not active or channels.holds(drawn.look.legend, brush))
+    dabs = Dabs()
+    if live:
+        dabs, _new = _new, dabs
+    if known and drawn.key == key:
+        if len(dabs) and drawn.look.follow(_live[1], dabs, _live[2]):
+            drawn.fill()
         return drawn
-    legend_before = drawn.legend if drawn is not None else None
-    drawn = _drawn[obj.name] = _Drawn(key)
     fields = _live[1] if live else _fields(obj) if active else None
     shape = sampled or found
-    vertices, normals = shape.vertices, shape.normals
-    colours = np.broadcast_to(np.array(GREY), vertices.shape)
-    if fields is not None:
-        if live and brush.channel == "MEAN":
-            vertices = channels.moved(fields, found)
-        if brush.show_channel:
-            view = channels.shown(context.scene, brush, fields, vertices, legend_before if live else None)
-            colours = colours if view.colours is None else view.colours
-            drawn.legend = view.legend
-        if brush.show_axes and brush.channel == "ANISOTROPY":
-            drawn.ellipses = channels.ellipses(fields, found)
-        if brush.channel == "CONDITION":
-            drawn.pins = channels.pins(settings.conditions, found)
-        if brush.show_shells:
-            drawn.shells = _shells(fields, found)
-    drawn.batch = draw.surface_batch(vertices, normals, shape.triangles, colours)
+    kept = drawn.look.legend if known and live and drawn.key[1] == key[1] else None
+    look = Look(context.scene, brush, fields, found, shape, moved=live, legend=kept)
+    drawn = _drawn[obj.name] = _Drawn(key, look, shape, found)
+    if fields is not None and brush.channel == "CONDITION":
+        drawn.pins = channels.pins(settings.conditions, found)
     return drawn
 
 
@@ -143,14 +147,6 @@ def _fields(obj):
         return bake.fields(obj)
     except ValueError:
         return None  # the tool's poll says why it cannot be painted on
-
-
-def _shells(fields, found):
-    way = fields.values("deviation", found.vertices)[:, None] * found.normals
-    return [
-        draw.surface_batch(found.vertices + side * way, found.normals, found.triangles, np.broadcast_to(tint, way.shape))
-        for side, tint in _SHELLS
-    ]
 
 
 def register():
@@ -162,12 +158,12 @@ def register():
 
 
 def unregister():
-    global _live
+    global _live, _new
     for handle in _handles:
         bpy.types.SpaceView3D.draw_handler_remove(handle, "WINDOW")
     _handles.clear()
     _drawn.clear()
-    _live = None
+    _live, _new = None, Dabs()
     surface.forget()
     sampling.forget()
     draw.forget()

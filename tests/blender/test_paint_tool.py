@@ -144,7 +144,9 @@ def test_what_the_overlay_shows(module, sphere, brush):
 def ellipses(module, obj):
     """Corners of what the overlay draws: (ellipses, sides, 3)."""
     bake, channels = module("paint.bake"), module("viewport.channels")
-    lines = channels.ellipses(bake.fields(obj), module("viewport.surface").of(obj)).reshape(-1, channels._SIDES, 2, 3)
+    surface = module("viewport.surface").of(obj)
+    lines, seen = channels.ellipses(bake.fields(obj), surface, channels.some_vertices(surface))
+    lines = lines[seen]
     assert np.allclose(lines[:, :, 1], np.roll(lines[:, :, 0], -1, axis=1)), "closed"
     return lines[:, :, 0]
 
