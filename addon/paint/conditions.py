@@ -3,10 +3,11 @@ the object, so undo, copies and files carry them."""
 
 import numpy as np
 
+from ..viewport.channels import matrices
 from . import bake
 
-# Of the deviation there: as good as exact to the eye. Points painted close to each other all but determine one another
-# where the kernel is smooth, and the last digits of a grid would contradict it.
+# Of the deviation there: as good as exact to the eye. For points within a length scale of another one: they all but
+# determine one another where the kernel is smooth, and the last digits of a grid would contradict it. Others are exact.
 _NOISE = 0.02
 
 
@@ -18,6 +19,7 @@ def pin(obj, locations, normals=None, slope=None):
     fields = bake.fields(obj)
     gradients = _gradients(fields, locations)
     deviations = fields.values("deviation", locations)
+    reach = np.sqrt(np.linalg.eigvalsh(matrices(fields.values("anisotropy", locations)))[:, 2])
     steepness = np.linalg.norm(gradients, axis=1)
     normals = gradients if normals is None else _points(normals)
     lengths = np.linalg.norm(normals, axis=1)
@@ -28,10 +30,12 @@ def pin(obj, locations, normals=None, slope=None):
             words = ", ".join(f"{part:.3g}" for part in place)
             raise ValueError(f"{bake.owner_of(obj)}: the mean has no normal at ({words}); say which one to pin there.")
     for i, place in enumerate(locations):
+        known = np.array([point.location for point in obj.gpis.conditions]).reshape(-1, 3)
+        crowded = np.any(np.linalg.norm(known - place, axis=1) < reach[i])
         point = obj.gpis.conditions.add()
         point.location = place
         point.normal = normals[i] / lengths[i]
-        point.noise = _NOISE * deviations[i]
+        point.noise = _NOISE * deviations[i] if crowded else 0.0
         point.slope = slope if slope is not None else (steepness[i] if steepness[i] > 0 else 1.0)
 
 

@@ -50,7 +50,7 @@ class GPISPaintTool(bpy.types.WorkSpaceTool):
             if value:
                 row = layout.row()
                 row.ui_units_x = 9 if value == "ratios" else 5
-                row.prop(brush, value, text="" if value in {"ratios", "color"} else None)
+                row.prop(brush, value, text="" if value in {"ratios", "color"} else None, slider=value == "ratios")
         row = layout.row(align=True)
         row.ui_units_x = 6
         scene_unit = brush.radius_unit == "SCENE"

@@ -24,7 +24,7 @@ def text(context, string, x, y, size=_SIZE, align="LEFT"):
 def draw_legend(context, legend):
     scale = context.preferences.system.ui_scale
     toolbar = next((region.width for region in context.area.regions if region.type == "TOOLS"), 0)
-    x, y = toolbar + 24 * scale, 36 * scale
+    x, y = toolbar + 24 * scale, 64 * scale  # above the panel of the last operator
     width, height = 16 * scale, 160 * scale
     parts = np.linspace(0, 1, _STEPS + 1)
     colours = np.hstack([colour.of(parts), np.ones((_STEPS + 1, 1))])

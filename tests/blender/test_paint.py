@@ -317,6 +317,17 @@ def test_condition_points(painted_sphere):
     assert bpy.ops.gpis.erase_conditions() == {"FINISHED"} and not bpy.context.object.gpis.conditions
 
 
+def test_a_pinned_point_is_exact_unless_others_are_near(painted_sphere, describe):
+    painted_sphere.gpis.sigma, painted_sphere.gpis.length_scale = 0.1, 0.3
+    paint("CONDITION", "PIN", [(1, 0, 0), (0, 0, 1)])
+    paint("CONDITION", "PIN", [(np.cos(0.2), 0, np.sin(0.2))])
+    assert [point.noise for point in painted_sphere.gpis.conditions] == pytest.approx([0, 0, 0.002])
+    (entry,), _ = describe()
+    mean, variance = entry["process"].posterior([(1, 0, 0), (0, 0, 1), (0, 1, 0)])
+    np.testing.assert_allclose(mean[:2], 0, atol=1e-6)
+    np.testing.assert_allclose(variance, [0, 0, 0.01], atol=1e-6)
+
+
 def test_condition_points_are_rendered(stage, painted_sphere, tmp_path):
     """A fuzzy disk's edge, pinned all along: it becomes crisper there, and only there."""
     painted_sphere.data.materials.append(support.diffuse("Black", (0, 0, 0)))
