@@ -81,6 +81,13 @@ def grid_names(data):
         return []
 
 
+def least(path, name):
+    """The least value of a grid of numbers; None where there is no such grid or file."""
+    if not os.path.isfile(path):
+        return None
+    return next((grid["value_range"][0] for grid in grids(path) if grid["name"] == name), None)
+
+
 def size(path, name):
     """Longest side of a grid's bounds in object units."""
     for grid in grids(path):

@@ -59,6 +59,9 @@ def _source(obj, path, base=False):
     if settings.sigma_source == "GRID" and not base:
         if settings.sigma_meaning == "UNSET":
             raise ValueError(f'say whether its grid "{settings.sigma_grid}" holds σ or σ² (Object properties, GPIS).')
+        least = volume.least(path, settings.sigma_grid)
+        if least is not None and least < 0:
+            raise ValueError(f'its grid "{settings.sigma_grid}" of σ holds {least:.3g}: a deviation is 0 or more.')
         source["sigma_grid"] = settings.sigma_grid
         source["sigma_meaning"] = "variance" if settings.sigma_meaning == "VARIANCE" else "value"
         source["sigma_factor"] = settings.sigma_factor
@@ -326,6 +329,8 @@ def rebuild_missing():
 
 def _present(data):
     """A volume's file, or the next version of it, which goes back to the same before anything was painted."""
+    if not data.filepath:
+        volume.path_of(data)  # says so
     path = Path(os.path.normpath(bpy.path.abspath(data.filepath, library=data.library)))
     others = files.versions_of(path)
     if path.is_file() or not others:

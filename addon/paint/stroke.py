@@ -31,6 +31,8 @@ DIRECTED = ("grab", "comb")
 FALLOFFS = ("smooth", "smoother", "sphere", "root", "sharp", "sharper", "inverse_square", "linear", "constant")
 
 _LENGTH = struct.Struct("<I")
+# From one point of a stroke to the next. More are not meant: a point far off, a brush too small.
+_MOST_DABS = 100_000
 
 
 @dataclass(frozen=True)
@@ -171,6 +173,12 @@ class Spacing:
         else:
             way = location - self._point
             length = float(np.linalg.norm(way))
+            least = 2 * self._spacing * min(self._size(self._pressure), self._size(pressure))
+            if length > _MOST_DABS * least:
+                raise ValueError(
+                    f"The next point of the stroke is {length:.3g} away, which takes {length / least:.3g} dabs, at most "
+                    f"{_MOST_DABS} are painted: go on nearer to the last point, or with a larger brush or spacing."
+                )
             done = 0.0
             while True:
                 at = self._pressure + (pressure - self._pressure) * (done / length if length else 1.0)

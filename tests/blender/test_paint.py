@@ -342,39 +342,3 @@ def test_condition_points_are_rendered(stage, painted_sphere, tmp_path):
         soft.append((edge[12:24, 24:].sum(), edge[12:24, :24].sum()))
     assert soft[1][0] < 0.8 * soft[0][0]
     assert soft[1][1] > 0.8 * soft[0][1]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "sentence"),
-    [
-        ({"stroke": []}, "The stroke has no points"),
-        ({"channel": "DEVIATION", "operation": "SET"}, "Deviation is to be set: say which value above 0"),
-        ({"channel": "MEAN", "operation": "COMB"}, 'The channel "mean" has no operation "comb": it takes inflate'),
-        ({"channel": "ANISOTROPY", "stroke": points([(1, 0, 0)])}, "it takes two points that differ"),
-        ({"channel": "MEAN", "stroke": points([(50, 0, 0)])}, "away from the grid, which is"),
-        ({"channel": "LENGTH_SCALE", "operation": "ADD", "value": 1e9}, r"value \(factor\) is 1e\+09"),
-    ],
-)
-def test_bad_strokes(painted_sphere, arguments, sentence):
-    before = painted_sphere.data.filepath
-    with pytest.raises(RuntimeError, match=sentence):
-        bpy.ops.gpis.paint_stroke(**({"stroke": points(arc(0))} | arguments))
-    assert painted_sphere.data.filepath == before and not painted_sphere.data.gpis_strokes
-    paint("DEVIATION", "SET", arc(0), value=0.2)  # and the next one works
-
-
-def test_what_cannot_be_painted_says_why(painted_sphere):
-    painted_sphere.gpis.enabled = False
-    with pytest.raises(RuntimeError, match="is switched off"):
-        paint("MEAN", "SMOOTH", arc(0))
-    painted_sphere.gpis.enabled = True
-    painted_sphere.gpis.sigma = 0
-    with pytest.raises(RuntimeError, match="standard deviation σ is 0, painting takes one above 0"):
-        paint("MEAN", "SMOOTH", arc(0))
-    painted_sphere.gpis.sigma = 0.1
-    painted_sphere.data.gpis_strokes = "no strokes"
-    with pytest.raises(RuntimeError, match="The strokes of this object are damaged"):
-        bpy.ops.gpis.paint_rebuild()
-    bpy.context.view_layer.objects.active = painted_sphere.gpis.source
-    with pytest.raises(RuntimeError, match="is no GPIS: select one"):
-        paint("MEAN", "SMOOTH", arc(0))
