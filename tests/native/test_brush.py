@@ -92,6 +92,24 @@ def test_a_brush_is_its_formula(painted, tmp_path, channel, operation, brush, sy
     compare(painted, reference, tmp_path / "painted.vdb")
 
 
+@pytest.mark.parametrize(("channel", "operation"), [brush[:2] for brush in BRUSHES if brush[1] in {"smooth", "flatten", "comb"}])
+def test_beyond_the_ends_of_the_grid_stands_the_nearest_node(painted, tmp_path, channel, operation):
+    """On all corners of a box that is no whole number of leaves: brushes that look at neighbours find none there."""
+    reference = Reference(bumpy_sphere(), ORIGIN, VOXEL, SIGMA, LENGTH)
+    ends = np.stack([ORIGIN, ORIGIN + VOXEL * (np.array(SHAPE) - 1)])
+    corners = ends[[*np.ndindex(2, 2, 2)], np.arange(3)]
+    around = corners + np.random.default_rng(3).uniform(-0.1, 0.1, (8, 3))
+    rough = {"deviation": ("set", 0.4), "length_scale": ("set", 0.5), "albedo": ("set", (0.1, 0.5, 1))}
+    directions = np.tile((1.0, 2.0, -1.5), (8, 1))
+    for fields in (painted, reference):
+        if operation == "smooth" and channel != "mean":
+            how, value = rough.get(channel, ("comb", None))
+            fields.apply(channel, how, corners, radius=0.3, strength=0.8, value=value, ratios=(3, 1, 1), directions=directions)
+        ratios = {"ratios": (4, 1, 1)} if operation == "comb" else {}
+        fields.apply(channel, operation, around, radius=0.35, strength=0.9, directions=directions, **ratios)
+    compare(painted, reference, tmp_path / "painted.vdb")
+
+
 @pytest.mark.parametrize(
     "falloff",
     ["smooth", "smoother", "sphere", "root", "sharp", "sharper", "inverse_square", "linear", "constant", "custom"],
