@@ -38,9 +38,13 @@ py::object realisation(const GaussianProcess& gp, const py::object& bounds, int 
     return progress.is_none() || !progress(fraction).is(py::bool_(false));
   };
   std::optional<RealisationGrid> grid;
-  {
+  try {
     py::gil_scoped_release release;
     grid = realise(gp, query, report);
+  } catch (const std::bad_alloc&) {
+    throw std::runtime_error("A realisation with " + std::to_string(resolution) +
+                             " nodes along its longest side takes more memory than is to be had. "
+                             "Take a lower resolution.");
   }
   if (!grid) return py::none();
   const auto& [x, y, z] = grid->resolution;

@@ -1,6 +1,10 @@
 """Realisations: their covariance and how Gaussian they are, grids against points, surface area and normals (design
 oracles, numbered as there)."""
 
+import os
+import subprocess
+import sys
+
 import gpis_native as gn
 import numpy as np
 import pytest
@@ -211,6 +215,32 @@ def test_refusals_and_cancel():
     # A kernel without gradient still has values.
     v = process(gn.Matern(0.5, 1.0)).realisation_at([[0.0, 0, 0], [1, 0, 0]], n=4000)["value"]
     check_z(np.mean(v[:, 0] * v[:, 1]), np.exp(-1), np.sqrt((1 + np.exp(-2)) / 4000))
+
+
+@pytest.mark.skipif("GPIS_SANITIZE" in os.environ, reason="a module built with a sanitizer takes all of the address space")
+def test_short_memory_is_said(tmp_path):
+    """In a process of its own: where the grid's values have no room, a sentence; then a smaller one has."""
+    script = tmp_path / "short.py"
+    script.write_text(
+        """
+import resource
+import gpis_native as gn
+gp = gn.GaussianProcess(0, 1, gn.SquaredExponential(0.5))
+box = ((-1, -1, -1), (1, 1, 1))
+gp.realisation(box, 8)
+now = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
+_, most = resource.getrlimit(resource.RLIMIT_AS)
+resource.setrlimit(resource.RLIMIT_AS, (now + (64 << 20), most))
+try:
+    gp.realisation(box, 512, threads=1)
+except RuntimeError as error:
+    print(error)
+print(gp.realisation(box, 16, threads=1)["realisation"].shape)
+"""
+    )
+    out = subprocess.run([sys.executable, script], capture_output=True, text=True, check=True).stdout
+    assert "512 nodes along its longest side takes more memory than is to be had. Take a lower resolution." in out
+    assert "(16, 16, 16)" in out
 
 
 def varying_process(kernel=None, mean=0.0, sigma=1.0):
