@@ -62,6 +62,13 @@ class GPIS_OT_add(bpy.types.Operator, AddObjectHelper):
         min=0.0,
         subtype="DISTANCE",
     )
+    narrow_band: FloatProperty(
+        name="Narrow Band",
+        description="Distances beyond this are not kept: for high resolutions. More than 6 σ, or 0 for the whole box",
+        default=0.0,
+        min=0.0,
+        subtype="DISTANCE",
+    )
 
     @classmethod
     def description(cls, context, properties):
@@ -78,7 +85,7 @@ class GPIS_OT_add(bpy.types.Operator, AddObjectHelper):
     def draw(self, context):
         layout = self.layout
         layout.use_property_split = True
-        for name in ("kind", "radius", "resolution", "margin", "align", "location", "rotation"):
+        for name in ("kind", "radius", "resolution", "margin", "narrow_band", "align", "location", "rotation"):
             layout.prop(self, name)
 
     def execute(self, context):
@@ -88,7 +95,9 @@ class GPIS_OT_add(bpy.types.Operator, AddObjectHelper):
         label = next(label for name, label, _, _ in _KINDS if name == self.kind)
         path = files.new_path(label)
         try:
-            voxel_size = shapes.write(self.kind, self.radius, path, resolution=self.resolution, margin=margin)
+            voxel_size = shapes.write(
+                self.kind, self.radius, path, resolution=self.resolution, margin=margin, narrow_band=self.narrow_band
+            )
         except (ValueError, RuntimeError, OSError) as error:
             self.report({"ERROR"}, f"The {label} is not added: {error}")
             return {"CANCELLED"}
@@ -97,6 +106,7 @@ class GPIS_OT_add(bpy.types.Operator, AddObjectHelper):
         obj = object_data_add(context, data, operator=self)
         settings = obj.gpis
         settings.bake_margin, settings.bake_resolution = margin, self.resolution
+        settings.bake_narrow_band = self.narrow_band
         settings.sigma, settings.length_scale = sigma, shape.length_scale * self.radius
         settings.kernel = shape.kernel
         if any(shape.infinite):
@@ -141,6 +151,13 @@ class GPIS_OT_from_volume(bpy.types.Operator):
         max=1024,
         soft_max=256,
     )
+    narrow_band: FloatProperty(
+        name="Narrow Band",
+        description="Of a fog: distances beyond this are not kept: for high resolutions. More than 6 σ, or 0 for the whole box",
+        default=0.0,
+        min=0.0,
+        subtype="DISTANCE",
+    )
 
     @classmethod
     def poll(cls, context):
@@ -159,6 +176,7 @@ class GPIS_OT_from_volume(bpy.types.Operator):
         column.active = self.meaning != "MEAN"
         column.prop(self, "level")
         column.prop(self, "resolution")
+        column.prop(self, "narrow_band")
 
     def execute(self, context):
         obj = context.active_object
@@ -203,7 +221,9 @@ class GPIS_OT_from_volume(bpy.types.Operator):
         size = float(max(vertices.max(axis=0) - vertices.min(axis=0)))
         margin = automatic_margin(DEFAULT_SIGMA * size, size)
         target = files.new_path(obj.name)
-        gn.bake_mesh_distance(vertices, triangles, str(target), resolution=self.resolution, margin=margin)
+        gn.bake_mesh_distance(
+            vertices, triangles, str(target), resolution=self.resolution, margin=margin, narrow_band=self.narrow_band
+        )
         if len([other for other in bpy.data.objects if other.data == obj.data]) > 1:
             obj.data = obj.data.copy()
         obj.data.is_sequence = False
@@ -211,6 +231,7 @@ class GPIS_OT_from_volume(bpy.types.Operator):
         settings = obj.gpis
         settings.sigma, settings.length_scale = DEFAULT_SIGMA * size, DEFAULT_LENGTH_SCALE * size
         settings.bake_margin, settings.bake_resolution = margin, self.resolution
+        settings.bake_narrow_band = self.narrow_band
 
 
 class VIEW3D_MT_gpis_add(bpy.types.Menu):

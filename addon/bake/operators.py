@@ -35,7 +35,7 @@ def mesh_arrays(depsgraph, source):
     return vertices.astype(np.float64), triangles
 
 
-def bake(context, volume_object, *, resolution, margin):
+def bake(context, volume_object, *, resolution, margin, narrow_band=0.0):
     """Bake the object's source into a new .vdb and give it to the object; returns what the native bake says."""
     settings = volume_object.gpis
     source = settings.source
@@ -57,7 +57,13 @@ def bake(context, volume_object, *, resolution, margin):
     window_manager.progress_begin(0, 100)
     try:
         report = native().bake_mesh_distance(
-            vertices, triangles, str(path), resolution=resolution, margin=margin, progress=_Progress(window_manager)
+            vertices,
+            triangles,
+            str(path),
+            resolution=resolution,
+            margin=margin,
+            narrow_band=narrow_band,
+            progress=_Progress(window_manager),
         )
     finally:
         window_manager.progress_end()
@@ -68,6 +74,7 @@ def bake(context, volume_object, *, resolution, margin):
     files.point(data, path)
     settings.bake_resolution = resolution
     settings.bake_margin = margin
+    settings.bake_narrow_band = narrow_band
     settings.mean_grid = "mean"
     painting.rebase(volume_object)
     return report
@@ -82,7 +89,7 @@ class _Progress:
         return True
 
 
-def make(context, source, *, resolution, margin=0.0):
+def make(context, source, *, resolution, margin=0.0, narrow_band=0.0):
     """A Volume object in place of a mesh object. It follows the mesh, which stays as a wire and is not rendered."""
     data = bpy.data.volumes.new(f"{source.name} GPIS")
     volume_object = bpy.data.objects.new(f"{source.name} GPIS", data)
@@ -94,7 +101,7 @@ def make(context, source, *, resolution, margin=0.0):
     context.view_layer.update()
     volume_object.gpis.source = source
     try:
-        report = bake(context, volume_object, resolution=resolution, margin=margin)
+        report = bake(context, volume_object, resolution=resolution, margin=margin, narrow_band=narrow_band)
     except Exception:
         bpy.data.objects.remove(volume_object)
         bpy.data.volumes.remove(data)
@@ -156,6 +163,13 @@ class _Bake:
         min=0.0,
         subtype="DISTANCE",
     )
+    narrow_band: FloatProperty(
+        name="Narrow Band",
+        description="Distances beyond this are not kept: for high resolutions. More than 6 σ, or 0 for the whole box",
+        default=0.0,
+        min=0.0,
+        subtype="DISTANCE",
+    )
 
     def run(self, bake_one, objects):
         result = {"CANCELLED"}
@@ -190,7 +204,9 @@ class GPIS_OT_make(_Bake, bpy.types.Operator):
         made = {}
 
         def make_one(source):
-            made[source], report = make(context, source, resolution=self.resolution, margin=self.margin)
+            made[source], report = make(
+                context, source, resolution=self.resolution, margin=self.margin, narrow_band=self.narrow_band
+            )
             return made[source], report
 
         result = self.run(make_one, sources)
@@ -213,12 +229,15 @@ class GPIS_OT_rebake(_Bake, bpy.types.Operator):
         return obj is not None and obj.type == "VOLUME" and obj.gpis.source is not None
 
     def invoke(self, context, event):
-        self.resolution = context.active_object.gpis.bake_resolution
+        settings = context.active_object.gpis
+        self.resolution, self.narrow_band = settings.bake_resolution, settings.bake_narrow_band
         return self.execute(context)
 
     def execute(self, context):
         def bake_one(obj):
-            return obj, bake(context, obj, resolution=self.resolution, margin=self.margin)
+            return obj, bake(
+                context, obj, resolution=self.resolution, margin=self.margin, narrow_band=self.narrow_band
+            )
 
         return self.run(bake_one, [context.active_object])
 

@@ -45,10 +45,13 @@ SHAPES = {
 }
 
 
-def write(kind, radius, path, *, resolution, margin):
-    """Write the grid `mean` of a shape to a new .vdb, `resolution` nodes along its longest side; returns the voxel size."""
+def write(kind, radius, path, *, resolution, margin, narrow_band=0.0):
+    """Write the grid `mean` of a shape to a new .vdb, `resolution` nodes along its longest side; returns the voxel size.
+
+    Distances beyond `narrow_band` (0: none) are cut off there.
+    """
     if kind == "SUZANNE":
-        return _write_suzanne(radius, path, resolution, margin)
+        return _write_suzanne(radius, path, resolution, margin, narrow_band)
     shape = SHAPES[kind]
     half = radius * np.array(shape.size) / 2 + margin
     voxel_size = 2 * half.max() / (resolution - 1)
@@ -62,8 +65,19 @@ def write(kind, radius, path, *, resolution, margin):
         mean = _cloud(x / radius, y / radius, z / radius) * radius
     else:
         mean = _box((x, y, z), radius * np.array(shape.centre), radius * np.array(shape.size) / 2)
+    if narrow_band:
+        check_narrow_band(narrow_band, voxel_size)
+        mean = np.clip(mean, -narrow_band, narrow_band)
     native().write_vdb(str(path), {"mean": mean, "origin": tuple(origin), "voxel_size": float(voxel_size)})
     return float(voxel_size)
+
+
+def check_narrow_band(narrow_band, voxel_size):
+    if narrow_band < 3 * voxel_size:
+        raise ValueError(
+            f"the narrow band is {narrow_band:.3g}; with voxels of {voxel_size:.3g} it takes at least three of them, "
+            f"{3 * voxel_size:.3g}, or 0 for the whole box."
+        )
 
 
 def _box(at, centre, half):
@@ -84,7 +98,7 @@ def _cloud(x, y, z):
     return -_MELT * np.log(total)
 
 
-def _write_suzanne(radius, path, resolution, margin):
+def _write_suzanne(radius, path, resolution, margin, narrow_band):
     mesh = bmesh.new()
     try:
         bmesh.ops.create_monkey(mesh, matrix=Matrix.Scale(radius, 4))
@@ -95,5 +109,7 @@ def _write_suzanne(radius, path, resolution, margin):
         triangles = np.array([[vertex.index for vertex in face.verts] for face in mesh.faces])
     finally:
         mesh.free()
-    report = native().bake_mesh_distance(vertices, triangles, str(path), resolution=resolution, margin=margin)
+    report = native().bake_mesh_distance(
+        vertices, triangles, str(path), resolution=resolution, margin=margin, narrow_band=narrow_band
+    )
     return report["voxel_size"]

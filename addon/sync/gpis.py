@@ -11,6 +11,8 @@ from .state import SyncError, array
 
 # Deviations between the surface and the bounds below which a visible part of the surfaces is cut off (one in 740).
 _SAFE_DEVIATIONS = 3.0
+# … beyond which the surface is at a point once in a billion, for the whole space that a narrow band leaves constant.
+_NARROW_BAND_DEVIATIONS = 6.0
 
 
 def add(sync, obj, matrix_world):
@@ -135,7 +137,12 @@ def _grid(owner, what, name, grids, path):
 
 
 def _warn_if_cut(sync, owner, obj, sigma):
-    margin = obj.gpis.bake_margin
+    band, margin = obj.gpis.bake_narrow_band, obj.gpis.bake_margin
+    if 0 < band < _NARROW_BAND_DEVIATIONS * sigma:
+        sync.warn(
+            f"{owner}: its narrow band of {band:.3g} is less than {_NARROW_BAND_DEVIATIONS:g} σ, and the mean is constant beyond: "
+            f"the surface also appears there. Bake with a narrow band of {_NARROW_BAND_DEVIATIONS * sigma:.3g} or more."
+        )
     if not 0 < margin < _SAFE_DEVIATIONS * sigma:
         return
     again = " Bake again: the margin then follows σ." if obj.gpis.source is not None else ""

@@ -124,6 +124,7 @@ class GPIS_PT_source(_VolumePanel, bpy.types.Panel):
         settings = context.object.gpis
         layout.prop(settings, "source")
         layout.prop(settings, "bake_resolution")
+        layout.prop(settings, "bake_narrow_band")
         row = layout.row(align=True)
         row.operator("gpis.rebake", icon="FILE_REFRESH")
         row.operator("gpis.remove", icon="X", text="Remove")

@@ -326,3 +326,10 @@ class GPIS_ObjectProperties(bpy.types.PropertyGroup):
     bake_margin: FloatProperty(
         name="Margin", description="Room around the mesh at the last bake", default=0.0, min=0.0, subtype="DISTANCE"
     )
+    bake_narrow_band: FloatProperty(
+        name="Narrow Band",
+        description="Distances beyond this are not kept by a bake. More than 6 σ, or 0: the whole box",
+        default=0.0,
+        min=0.0,
+        subtype="DISTANCE",
+    )

@@ -170,7 +170,7 @@ std::vector<std::array<int, 3>> faces_argument(const py::object& triangles) {
 
 py::object bake(const py::array_t<double, py::array::c_style | py::array::forcecast>& vertices,
                 const py::object& triangles, const py::object& path, int resolution, double margin,
-                const py::object& progress) {
+                double narrow_band, const py::object& progress) {
   if (vertices.ndim() != 2 || vertices.shape(1) != 3)
     refuse("bake_mesh_distance: vertices has ", vertices.ndim(), " dimensions; it takes (N, 3).");
   std::vector<Vec3> points(vertices.shape(0));
@@ -190,7 +190,8 @@ py::object bake(const py::array_t<double, py::array::c_style | py::array::forcec
   std::optional<MeshBake> report;
   {
     py::gil_scoped_release release;
-    report = bake_mesh_distance(points, faces, file, resolution, margin, report_progress);
+    report =
+        bake_mesh_distance(points, faces, file, resolution, margin, narrow_band, report_progress);
   }
   if (!report) return py::none();
   const double seconds =
@@ -233,7 +234,7 @@ name, type ('float', 'vec3s', ...), resolution (3,) nodes of the box of active v
         R"(Writes a new .vdb file from a dict of arrays on the same nodes.
 
 grids: origin (3,), voxel_size (a number or three), and arrays (X, Y, Z), (X, Y, Z, 3), or (X, Y, Z, 6) as 'anisotropy' (entries
-xx,yy,zz,xy,xz,yz, kept as two vector grids). What compose_and_fit returns is such a dict; its counters are left out. Single precision; every node is active. ValueError, FileNotFoundError (folder).)");
+xx,yy,zz,xy,xz,yz, kept as two vector grids). What compose_and_fit returns is such a dict; its counters are left out. Single precision; every node is active, blocks of one value take no memory. ValueError, FileNotFoundError (folder).)");
   m.def(
       "read_vdb", &read, "path"_a, py::kw_only(), "names"_a = std::vector<std::string>{},
       R"(Grids of a .vdb file as a dict of arrays (X, Y, Z) or (X, Y, Z, 3), 'anisotropy' (X, Y, Z, 6), origin and voxel_size.
@@ -241,11 +242,12 @@ xx,yy,zz,xy,xz,yz, kept as two vector grids). What compose_and_fit returns is su
 Arrays cover the box of all active voxels of the grids read (`names`, or all of them), which must stand on the same nodes.)");
   m.def(
       "bake_mesh_distance", &bake, "vertices"_a, "triangles"_a, "path"_a, py::kw_only(),
-      "resolution"_a = 96, "margin"_a = 0.0, "progress"_a = py::none(),
+      "resolution"_a = 96, "margin"_a = 0.0, "narrow_band"_a = 0.0, "progress"_a = py::none(),
       R"(Bakes the signed distance from a triangle mesh, positive outside, into the grid 'mean' of a new .vdb file.
 
 vertices (N, 3), triangles (M, 3) of indices, facing outwards (a mesh that is inside out as a whole is turned). The nodes cover
-the mesh's bounds with `margin` around them, `resolution` of them along the longest side. An open mesh, or one that meets
+the mesh's bounds with `margin` around them, `resolution` of them along the longest side. Distances beyond `narrow_band` (0: none) are cut off there: blocks of such nodes
+take no memory. Keep it above 6 standard deviations, or the random surface fills the space beyond. An open mesh, or one that meets
 itself, is closed where its generalized winding number is 1/2. progress(fraction) may return False to cancel.
 
 Returns dict(voxel_size, origin (3,), resolution (3,), closed, open_edges, meets_itself, seconds), or None where cancelled (then no file

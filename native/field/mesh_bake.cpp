@@ -238,20 +238,31 @@ class Bake {
 std::optional<MeshBake> bake_mesh_distance(const std::vector<Vec3>& vertices,
                                            const std::vector<std::array<int, 3>>& triangles,
                                            const std::string& path, int resolution, double margin,
+                                           double narrow_band,
                                            const std::function<bool(double)>& progress) {
   if (resolution < 8 || resolution > 2048)
     refuse("resolution is ", resolution, "; it takes 8 to 2048 nodes along the longest side.");
   if (!(margin >= 0 && std::isfinite(margin)))
     refuse("margin is ", margin, "; it takes a length of 0 or more.");
+  if (!(narrow_band >= 0 && std::isfinite(narrow_band)))
+    refuse("narrow_band is ", narrow_band, "; it takes a length, or 0 for the whole box.");
   const Mesh mesh = make_mesh(vertices, triangles);
   Bake bake(mesh, resolution, margin, progress);
+  // The slope at the surface is that of the cell which holds it, and brushes look one node further.
+  const double voxel = bake.report().voxel_size;
+  if (narrow_band > 0 && narrow_band < 3 * voxel)
+    refuse("narrow_band is ", narrow_band, "; with voxels of ", voxel,
+           " it takes at least three of them, ", 3 * voxel, ", or 0 for the whole box.");
   if (!bake.measure() || !bake.sign()) return std::nullopt;
   if (!bake.simple() && !bake.close()) return std::nullopt;
   const MeshBake report = bake.report();
+  std::vector<float> distance = bake.take();
+  if (narrow_band > 0)
+    for (float& d : distance) d = std::clamp(d, -float(narrow_band), float(narrow_band));
   write_vdb(path, {report.resolution,
                    Vec3{1, 1, 1} * report.voxel_size,
                    report.origin,
-                   {{"mean", 1, bake.take()}}});
+                   {{"mean", 1, std::move(distance)}}});
   progress(1);
   return report;
 }

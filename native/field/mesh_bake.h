@@ -32,12 +32,14 @@ struct MeshBake {
 };
 
 // Vertices at one place count as one. `resolution`: nodes along the longest side of the mesh's
-// bounds with `margin` around them, the first and last on its ends. Writes the grid `mean`,
-// positive outside, to `path`. `progress` (fraction) returns false to cancel: then nothing is
-// written, and nothing returned. Throws std::invalid_argument with a sentence.
+// bounds with `margin` around them, the first and last on its ends. Distances beyond `narrow_band`
+// (0: none) are cut off there. Writes the grid `mean`, positive outside, to `path`. `progress`
+// (fraction) returns false to cancel: then nothing is written, and nothing returned. Throws
+// std::invalid_argument with a sentence.
 std::optional<MeshBake> bake_mesh_distance(const std::vector<Vec3>& vertices,
                                            const std::vector<std::array<int, 3>>& triangles,
                                            const std::string& path, int resolution, double margin,
+                                           double narrow_band,
                                            const std::function<bool(double)>& progress);
 
 }  // namespace gpis

@@ -52,6 +52,7 @@ void put(openvdb::GridPtrVec& out, const VdbArrays& arrays, const VdbArray& arra
         else
           voxels.setValueOn({i, j, k}, Value(v[0], v[1], v[2]));
       }
+  grid->pruneGrid();  // blocks of one value: beyond a narrow band
   grid->setName(array.name);
   const Vec3 h = arrays.voxel_size, o = arrays.origin;
   auto transform = openvdb::math::Transform::createLinearTransform(1.0);

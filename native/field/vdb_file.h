@@ -34,9 +34,9 @@ struct VdbArrays {
   std::vector<VdbArray> grids;
 };
 
-// All nodes are active; the background of a scalar grid is its largest value (a mean is positive
-// far outside), of a vector grid 0. Written beside `path` first, so that nobody ever sees half a
-// file.
+// All nodes are active, blocks of one value are kept as one; the background of a scalar grid is its
+// largest value (a mean is positive far outside), of a vector grid 0. Written beside `path` first,
+// so that nobody ever sees half a file.
 void write_vdb(const std::string& path, const VdbArrays& arrays);
 
 // The grids of these names (all, if there are none) over the box of all their active voxels. Scalar

@@ -43,6 +43,19 @@ def test_means_are_signed_distances(gn, stage, kind, top):
     assert mean_of(gn, bpy.context.object)(points) == pytest.approx(expected, abs=0.01)
 
 
+@pytest.mark.parametrize("kind", ["SPHERE", "SUZANNE"])
+def test_a_narrow_band_is_kept_and_watched(gn, stage, describe, kind):
+    bpy.ops.gpis.add(kind=kind, radius=1.0, resolution=64, margin=0.8, narrow_band=0.3)
+    obj = bpy.context.object
+    mean = mean_of(gn, obj)([(1.7, 0, 0), (1.1, 0, 0), (0, 0, 0)])
+    assert mean[0] == pytest.approx(0.3) and abs(mean[2]) <= 0.3 + 1e-6
+    assert obj.gpis.bake_narrow_band == pytest.approx(0.3) and describe()[1] == []
+    obj.gpis.sigma = 0.06
+    assert "narrow band of 0.3 is less than 6 σ" in describe()[1][0] and "0.36 or more" in describe()[1][0]
+    with pytest.raises(RuntimeError, match="narrow.band is 0.05; with voxels of .* at least three"):
+        bpy.ops.gpis.add(kind=kind, radius=1.0, resolution=64, narrow_band=0.05)
+
+
 def test_height_field_does_not_change_with_height(stage, describe):
     bpy.ops.gpis.add(kind="HEIGHT_FIELD", radius=1.0, resolution=32)
     (entry,), _ = describe()

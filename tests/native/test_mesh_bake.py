@@ -123,6 +123,23 @@ def test_progress_and_cancel(tmp_path):
         gn.bake_mesh_distance(*cube, path, progress=fail)
 
 
+def test_a_narrow_band_cuts_distances_off(tmp_path):
+    mesh, options = sphere_mesh(), {"resolution": 96, "margin": 1.0}
+    _, whole = bake(tmp_path / "whole.vdb", mesh, **options)
+    report, band = bake(tmp_path / "band.vdb", mesh, narrow_band=0.2, **options)
+    np.testing.assert_array_equal(band, np.clip(whole, np.float32(-0.2), np.float32(0.2)))
+    assert (np.abs(whole) > 0.2).mean() > 0.5
+    # The space is the same, and blocks beyond take no memory.
+    (a,), (b,) = gn.vdb_grids(tmp_path / "whole.vdb"), gn.vdb_grids(tmp_path / "band.vdb")
+    assert (a["min"], a["max"], a["resolution"]) == (b["min"], b["max"], b["resolution"])
+    assert (tmp_path / "band.vdb").stat().st_size < 0.5 * (tmp_path / "whole.vdb").stat().st_size
+    x = nodes(report).reshape(-1, 3)
+    np.testing.assert_array_equal(gn.VdbField(tmp_path / "band.vdb", "mean")(x), band.ravel())
+    with pytest.raises(ValueError, match=r"narrow_band is 0.05; with voxels of .* at least three of them"):
+        bake(tmp_path / "thin.vdb", mesh, narrow_band=0.05, **options)
+    assert not (tmp_path / "thin.vdb").exists()
+
+
 def test_unusable_meshes_get_a_sentence(tmp_path):
     vertices, triangles = box_mesh((0, 0, 0), (1, 1, 1))
     path = tmp_path / "x.vdb"
@@ -134,6 +151,8 @@ def test_unusable_meshes_get_a_sentence(tmp_path):
         "finite": (np.where(vertices > 0, np.nan, vertices), triangles, {}),
         "resolution is 3": (vertices, triangles, {"resolution": 3}),
         "margin is -1": (vertices, triangles, {"margin": -1.0}),
+        "narrow_band is -1": (vertices, triangles, {"narrow_band": -1.0}),
+        "narrow_band is nan": (vertices, triangles, {"narrow_band": np.nan}),
     }
     for text, (v, t, options) in cases.items():
         with pytest.raises(ValueError) as error:
