@@ -123,8 +123,7 @@ void JointDensePath::at(long cell, double t, Rng&, double& g, double& dg) const 
 }
 
 std::unique_ptr<LineSampler> make_joint_dense(const GaussianProcess& process, const Box3& bounds) {
-  return std::make_unique<MarchSampler<AnyLine, AnyLine, JointDensePath>>(
-      JointDensePath::Plan(process, bounds));  // covariances cost more than virtual fields
+  return make_sampler<JointDensePath, Fields::any>(process, bounds);
 }
 
 }  // namespace gpis

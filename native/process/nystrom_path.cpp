@@ -233,8 +233,7 @@ double NystromPath::deviation(double a, double h) const {
 }
 
 std::unique_ptr<LineSampler> make_nystrom(const GaussianProcess& process, const Box3& bounds) {
-  return std::make_unique<MarchSampler<AnyLine, AnyLine, NystromPath>>(
-      NystromPath::Plan(process, bounds));  // covariances cost more than virtual fields
+  return make_sampler<NystromPath, Fields::any>(process, bounds);
 }
 
 }  // namespace gpis

@@ -24,7 +24,10 @@ ROWS = {
 @pytest.mark.parametrize("counter", ROWS)
 def test_what_is_left_out_is_not_entered(counter, seed):
     assert counted(scene(), seed)[counter] == 0
-    assert counted(ROWS[counter](), seed)[counter] > 0
+    stats = counted(ROWS[counter](), seed)
+    assert stats[counter] > 0
+    # What is switched on brings nothing else with it.
+    assert {row: stats[row] for row in ROWS if row != counter and stats[row]} == {}
 
 
 def test_embree_is_not_opened_without_meshes():
