@@ -112,6 +112,19 @@ double rest_in_middle(const Radial& radial, double h, const Eigen::Matrix<double
                                      w.dot(covariance_of_ends(radial, h) * w)));
 }
 
+// Halves know the ends of their interval alone. For Matérn 5/2, whose state has g'' too, that
+// leaves out the covariance of a middle with points outside, once for each of two middles; the
+// largest.
+double hidden_from_halves(const Radial& radial, double h) {
+  const Eigen::Vector4d weights =
+      covariance_of_ends(radial, h).fullPivLu().solve(covariance_with_ends(radial, h, 0.5));
+  double largest = 0;
+  for (double s = 1; s < 40; s += 0.25)
+    largest = std::max(largest, std::abs(radial.value((s - 0.5) * h) -
+                                         weights.dot(covariance_with_ends(radial, h, s))));
+  return largest;
+}
+
 }  // namespace
 
 class DenseFactor {
@@ -186,12 +199,13 @@ DensePath::Plan::Plan(const GaussianProcess& process, const Box3& bounds)
                 std::pow(step, power);
   } else {
     power = radial.family == Radial::Family::matern52 ? 2.5 : 1.5;
+    while (power > 2 && hidden_from_halves(radial, step) > 1e-4) step /= 2;
     const double rest = rest_in_middle(radial, step, bend);
     // (B₁+B₂)(½) = ¾; 5% for what smaller intervals deviate more, relative to h^power.
     deviation = 4.5 * 1.05 * rest / 0.75 / std::pow(step, power);
     for (int i = 0; i < kHalvings; ++i) halvings.push_back(halving(radial, std::ldexp(step, -i)));
     const double finest = deviation / 4.5 * std::pow(std::ldexp(step, -kHalvings), power);
-    correlation_error = 2 * finest + (power > 2 ? rest * rest : 0);
+    correlation_error = 2 * finest + (power > 2 ? 2 * hidden_from_halves(radial, step) : 0);
   }
   for (reach = 8; reach < lengths;) reach *= 2;
   factor = DenseFactor::shared(radial, step, static_cast<int>(std::lround(reach / step)) + 2);

@@ -12,19 +12,28 @@ namespace {
 // costs 1e-3 where it is stable). The correlation is off by this much, the path stays a cubic.
 constexpr double kJitter = 1e-6;
 
-// |implied - exact correlation| of the cubics through values and slopes at points h apart from the
-// middle of one cell to that of another and to the points, at most.
-double error_of_cubics(const Covariance& covariance, const LineGeometry& line, double t, double h) {
+// Of a line that is surveyed, each as a ray of its own.
+constexpr int kParts = 6;
+// What is found there is exceeded on lines of other directions, by 1.4 in
+// tests/native/test_implied_covariance.cpp.
+constexpr double kElsewhere = 2;
+
+// |implied - exact correlation| of the cubics through values and slopes at points h apart from
+// within one cell to within another and to the points, at most.
+double error_of_cubics(const Covariance& covariance, const SurveyLine& survey, double t, double h) {
+  const LineGeometry& line = survey.geometry;
   struct Part {
     LocalPoint at;
     Functional what;
   };
   const Vec3 d = line.direction;
   const auto at = [&](double s) { return covariance.at(line.origin + d * s); };
-  // The error in the middle of a cell: what the cubic has there, less g.
-  const auto error = [&](double a) {
-    return std::array<Part, 3>{Part{at(a), {0.5, d * (h / 8)}}, Part{at(a + 0.5 * h), {-1, {}}},
-                               Part{at(a + h), {0.5, d * (-h / 8)}}};
+  // The error at a fraction s of a cell: what the cubic has there, less g.
+  const auto error = [&](double a, double s) {
+    const double r = 1 - s;
+    return std::array<Part, 3>{Part{at(a), {r * r * (1 + 2 * s), d * (r * r * s * h)}},
+                               Part{at(a + s * h), {-1, {}}},
+                               Part{at(a + h), {s * s * (1 + 2 * r), d * (-s * s * r * h)}}};
   };
   const auto value = [&](double s) { return std::array<Part, 1>{Part{at(s), {}}}; };
   const auto shared = [&](const auto& a, const auto& b) {
@@ -33,14 +42,20 @@ double error_of_cubics(const Covariance& covariance, const LineGeometry& line, d
       for (const Part& q : b) sum += covariance.between(p.at, p.what, q.at, q.what);
     return sum;
   };
-  const auto here = error(t);
   double largest = 0;
-  for (int k = 0; k < 4; ++k) {
-    const double a = t + k * h;
-    const auto there = error(a);
-    const double at_middles =
-        shared(here, value(a + 0.5 * h)) + shared(value(t + 0.5 * h), there) + shared(here, there);
-    largest = std::max({largest, std::abs(at_middles), std::abs(shared(here, value(a)))});
+  for (const double s : {0.25, 0.5, 0.75}) {
+    const auto here = error(t, s);
+    for (int k = 0; k < 4; ++k) {
+      const double a = t + k * h;
+      if (a + h > survey.end) break;  // lengths may change at once where bounds end
+      largest = std::max(largest, std::abs(shared(here, value(a))));
+      for (const double u : {0.25, 0.5, 0.75}) {
+        const auto there = error(a, u);
+        largest =
+            std::max(largest, std::abs(shared(here, value(a + u * h)) +
+                                       shared(value(t + s * h), there) + shared(here, there)));
+      }
+    }
   }
   return largest / covariance.variance();
 }
@@ -52,15 +67,19 @@ JointDensePath::Plan::Plan(const GaussianProcess& process, const Box3& bounds)
   // Closer points until the cubics are good enough for lengths that vary.
   for (;; spacing *= 0.7) {
     correlation_error = 0;
-    for (const SurveyLine& line : survey_lines(covariance, bounds)) {
-      const double h = 2 * spacing * survey_step(covariance, line.geometry, 0, line.end);
-      if (!std::isfinite(h)) continue;
-      const int cells = static_cast<int>(std::min(line.end / h, 200.0));
-      for (int i = 0; i < cells; ++i)
-        correlation_error =
-            std::max(correlation_error, error_of_cubics(covariance, line.geometry, i * h, h));
-    }
-    if (correlation_error < 5e-4 || spacing < 0.05) break;
+    for (const SurveyLine& line : survey_lines(covariance, bounds))
+      // Points of a short ray lie farther apart: the shortest lengths of the line may be elsewhere.
+      for (int part = 0; part < kParts; ++part) {
+        const double begin = line.end * part / kParts, end = line.end * (part + 1) / kParts;
+        const double h = 2 * spacing * survey_step(covariance, line.geometry, begin, end);
+        if (!std::isfinite(h)) continue;
+        const int cells = static_cast<int>(std::min(std::ceil((end - begin) / h), 40.0));
+        for (int i = 0; i < cells; ++i)
+          correlation_error =
+              std::max(correlation_error, error_of_cubics(covariance, line, begin + i * h, h));
+      }
+    correlation_error *= kElsewhere;
+    if (correlation_error < 1e-3 || spacing < 0.05) break;
   }
 }
 

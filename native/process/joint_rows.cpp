@@ -98,7 +98,7 @@ double JointRows::add_free(const LocalPoint& at, const Functional& what, Rng& rn
   const double variance = (1 + jitter) * own(at, what, on_line);
   double mean;
   const double pivot = border(at, what, variance, mean, on_line);
-  if (!(pivot > kDrawnPivot * variance)) {
+  if (!(pivot > drawn_pivot(on_line) * variance)) {
     ++counters.pivots_dropped;
     return mean;
   }
@@ -133,7 +133,7 @@ void JointRows::rebase(const JointRows& base, int last) {
     const double variance = own(row.at, row.what, on_line) + row.noise;
     double mean;
     const double pivot = border(row.at, row.what, variance, mean, on_line);
-    if (!(pivot > (row.known ? kPivot : kDrawnPivot) * variance)) continue;
+    if (!(pivot > (row.known ? kPivot : drawn_pivot(on_line)) * variance)) continue;
     append(row, pivot, (row.value - mean) / std::sqrt(pivot));
     if (has_line_) line_.add_copy(first_kept + i);
   }
@@ -194,9 +194,13 @@ void JointRows::law(Crosses v, const LocalPoint& at, Eigen::Vector4d& mean,
   covariance -= v * v.transpose();
 }
 
-double JointRows::variance_left(const LocalPoint& at, const LinePoint* on_line) {
+double JointRows::covariance_left(const LocalPoint& x, const LinePoint* x_on_line,
+                                  const LocalPoint& y, const LinePoint* y_on_line) {
   double mean;
-  return border(at, {}, covariance_->variance(), mean, on_line);
+  border(x, {}, 0, mean, x_on_line);
+  const Eigen::VectorXd of_x = next_.head(active());
+  border(y, {}, 0, mean, y_on_line);
+  return covariance_->value(x, y) - of_x.dot(next_.head(active()));
 }
 
 JointRows::Mean JointRows::mean() const {

@@ -16,8 +16,10 @@ class JointRows {
   // A row is left out where the rows before leave it less variance than this, relative to its own:
   // known ones (definitions B11), and drawn ones. Rounding reaches the variance left to later rows
   // multiplied by the square of weights that grow as 1/√pivot: rows come in the order of the line
-  // and not of their pivots, so drawn ones, which nobody misses, are left out earlier.
-  static constexpr double kPivot = 1e-10, kDrawnPivot = 1e-7;
+  // and not of their pivots, so drawn ones, which nobody misses, are left out earlier. Where
+  // lengths vary still earlier: at 1e-7 covariances behind a sudden change of them were off by 100
+  // on some lines. What is left out is a kink of the path, of its root in slope deviations.
+  static constexpr double kPivot = 1e-10, kDrawnPivot = 1e-7, kVaryingPivot = 1e-5;
 
   void reset(const Covariance& covariance);
   // Starts with the rows of another: solved once, used by many.
@@ -54,8 +56,9 @@ class JointRows {
   void law(const LocalPoint& at, Eigen::Vector4d& mean, Eigen::Matrix4d& covariance) const;
   void law(const LocalPoint& at, const LinePoint& on_line, Eigen::Vector4d& mean,
            Eigen::Matrix4d& covariance);
-  // Variance that they leave to the value there.
-  double variance_left(const LocalPoint& at, const LinePoint* on_line);
+  // Covariance that they leave to the values at two points; null: elsewhere than on the line.
+  double covariance_left(const LocalPoint& x, const LinePoint* x_on_line, const LocalPoint& y,
+                         const LinePoint* y_on_line);
 
   // A functional in units of the active rows' independent parts: its covariance with what they
   // leave of another is the prior's less the product of both; its mean is the product with
@@ -110,6 +113,9 @@ class JointRows {
     bool copied = false;  // from a base, or kept when others were forgotten
     bool on_line = false;
   };
+  static double drawn_pivot(const LinePoint* on_line) {
+    return on_line ? kVaryingPivot : kDrawnPivot;
+  }
   using FactorRow = Eigen::Map<const Eigen::VectorXd>;
 
   // Row i of the factor, of the active rows: i entries and its diagonal.

@@ -40,8 +40,10 @@ NystromPath::Plan::Plan(const GaussianProcess& process, const Box3& bounds)
     const double h = 0.5 / std::sqrt(covariance.shortest_inverse2());
     cubic = 16 * bound_of(deviation_from_cubic(Covariance(stationary), {{}, {1, 0, 0}}, 0, h), 0);
   }
-  // |implied - exact covariance| is at most the variance that the nodes leave, here on lines
-  // through the bounds; closer nodes until it is small.
+  // Closer nodes until the error is small on lines through the bounds. Without a tensor field,
+  // where this sampler is asked for or serves conditions, nodes closer than that determine each
+  // other but for rounding.
+  const double enough = process.anisotropy ? 5e-4 : 3e-3;
   for (;; spacing *= 0.85) {
     correlation_error = 0;
     for (const SurveyLine& line : survey_lines(covariance, bounds)) {
@@ -53,16 +55,30 @@ NystromPath::Plan::Plan(const GaussianProcess& process, const Box3& bounds)
       path.start_free(rng, counters, g, dg);
       while (path.nodes_.back().t < line.end) {
         path.extend(rng, counters);
-        const double t = 0.5 * (path.intervals_.back().begin + path.intervals_.back().end);
-        if (!std::isfinite(t)) continue;
-        const Node middle = path.node(t);
-        const double left =
-            path.rows_.variance_left(path.point(t), path.varies() ? &middle.at : nullptr);
-        correlation_error = std::max(correlation_error, left / covariance.variance());
+        const double error = path.error_in(path.intervals_.back());
+        correlation_error = std::max(correlation_error, error / covariance.variance());
       }
     }
-    if (correlation_error < 2e-4 || spacing < 0.3) break;
+    if (correlation_error < enough || spacing < 0.3) break;
   }
+}
+
+// |implied - exact covariance|: what the rows so far leave of g in the middle of an interval is
+// left out, so that nothing drawn later has its covariance with that.
+double NystromPath::error_in(const Interval& interval) {
+  if (!std::isfinite(interval.end)) return 0;
+  const double middle = 0.5 * (interval.begin + interval.end);
+  const Node x = node(middle), last = nodes_.back();
+  const auto left = [&](double t) {
+    const Node y = node(t);
+    return std::abs(rows_.covariance_left(point(middle), varies() ? &x.at : nullptr, point(t),
+                                          varies() ? &y.at : nullptr));
+  };
+  double error = left(middle);
+  if (!std::isfinite(last.t)) return error;
+  for (int i = 1; i <= kLater; ++i)
+    error = std::max(error, left(last.t + 0.5 * i * last.length_scale));
+  return error;
 }
 
 void NystromPath::reset(const Plan& plan, const LineGeometry& line, double anchor, double t_end,

@@ -39,6 +39,7 @@ class NystromPath : public JointLine {
  private:
   static constexpr double kSliver = 1e-6;
   static constexpr int kMostHalvings = 5;
+  static constexpr int kLater = 6;  // points behind the last node that error_in looks at
 
   struct Node {
     double t;
@@ -55,6 +56,7 @@ class NystromPath : public JointLine {
   Node after(const Node& node) const;
   double plan_step(double t_end) const;
   void begin_at_anchor(double g, double dg);
+  double error_in(const Interval& interval);
   void extend(Rng& rng, Counters& counters);
   void draw(Node& node, Rng& rng, Counters& counters);
   const JointRows::Mean& mean(Interval& interval);
