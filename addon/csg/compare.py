@@ -112,7 +112,7 @@ class GPIS_OT_csg_compare(Working, bpy.types.Operator):
 
     bl_idname = "gpis.csg_compare"
     bl_label = "Compare with the List"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"UNDO"}
     doing = "Rendering the list and its fit"
     cancelled = "The comparison was cancelled."
 

@@ -173,7 +173,7 @@ class Spacing:
         else:
             way = location - self._point
             length = float(np.linalg.norm(way))
-            least = 2 * self._spacing * min(self._size(self._pressure), self._size(pressure))
+            least = self._spacing * (self._size(self._pressure) + self._size(pressure))  # of middle pressure
             if length > _MOST_DABS * least:
                 raise ValueError(
                     f"The next point of the stroke is {length:.3g} away, which takes {length / least:.3g} dabs, at most "

@@ -22,7 +22,9 @@ def describe(depsgraph, width, height, view=None):
     sync.description["settings"] = settings.describe(sync)
     sync.description["camera"] = camera.describe(sync, width, height) if view is None else view
     sync.description["world"] = world.describe(sync)
-    operands = csg.operands(depsgraph.scene)
+    # Objects of a collection that is instanced need not be in the scene.
+    instanced = [i.object.original for i in depsgraph.object_instances if i.is_instance and i.object.type == "VOLUME"]
+    operands = csg.operands([*depsgraph.scene.objects, *instanced])
     for instance in depsgraph.object_instances:
         hidden = view is not None and instance.object.hide_render
         if instance.show_self and not hidden and instance.object.name_full not in operands:

@@ -26,13 +26,13 @@ def reaches(obj, target):
     return False
 
 
-def operands(scene):
-    """Names of the objects in the lists of the scene's GPIS objects: parts of these, and none of their own. (What Blender
+def operands(objects):
+    """Names of the objects in the lists of GPIS objects: parts of these, and none of their own. (What Blender
     hides in renders it would not evaluate either: an operand that is moved would stand still in an animation.) Objects
     whose lists lead back to themselves are no operands, so that compose() finds them."""
     return {
         item.object.name_full
-        for obj in scene.objects
+        for obj in objects
         if obj.type == "VOLUME" and obj.gpis.enabled
         for item in obj.gpis_csg.items
         if item.object is not None and not reaches(item.object, obj)

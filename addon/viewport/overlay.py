@@ -71,7 +71,7 @@ def _shown(context):
     space = context.space_data
     if space is None or space.type != "VIEW_3D" or not space.overlay.show_overlays or space.shading.type == "RENDERED":
         return
-    operands = csg.operands(context.scene)
+    operands = csg.operands(context.scene.objects)
     for obj in context.view_layer.objects:
         if obj.type != "VOLUME" or not obj.gpis.enabled or not obj.visible_get(viewport=space):
             continue

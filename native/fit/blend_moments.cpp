@@ -39,7 +39,7 @@ struct Difference {
   double share(double z) const { return std::clamp(0.5 + delta(z) / (2 * blend), 0.0, 1.0); }
   double value(double z) const {
     const double overlap = std::max(blend - std::abs(delta(z)), 0.0);
-    return std::max(mean_a + ca * z, mean_b + cb * z) + overlap * overlap / (4 * blend);
+    return std::max(mean_a + ca * z, mean_b + cb * z) + overlap * (overlap / (4 * blend));
   }
 
   // visit(z, step, probability), in panels that end where F changes from one polynomial of z to

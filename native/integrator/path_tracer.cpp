@@ -31,11 +31,12 @@ struct PathTracer::Impl {
         stop(stop_when),
         max_bounces(s.description().settings.max_bounces.value_or(kPathLengthLimit)),
         path(scene),
-        first_line(scene.bodies.size()) {
+        lines(scene.stochastic.size()) {
     std::size_t most = 0;
     for (const auto& body : scene.bodies) most = std::max(most, body.surface.leaves().size());
     starts.resize(most);
     shadow_lines.resize(most);
+    for (Line& line : lines) line.stop_when(stop);
     for (Line& line : shadow_lines) line.stop_when(stop);
   }
 
@@ -44,9 +45,8 @@ struct PathTracer::Impl {
                     States remembered, std::span<RealisationMemory> kept, Rng& random);
   // That hold the sample paths of a body along the ray in hand, which has entered it.
   std::span<Line> lines_of(int b) {
-    return std::span(lines).subspan(first_line[b], scene.bodies[b].surface.leaves().size());
+    return std::span(lines).subspan(scene.bodies[b].first, scene.bodies[b].surface.leaves().size());
   }
-  std::span<Line> take_lines(int b);
   bool closest(const Ray& ray, double t_max, Vertex& v);
   void leave_bounds(const Ray& ray, double t);
   void remember_others(const Vertex& v);
@@ -69,11 +69,9 @@ struct PathTracer::Impl {
   const std::atomic<bool>* const stop;
   const int max_bounces;
   PathMemory path;
-  // The sample paths along the ray in hand: one a leaf of the bodies that it has entered, in their
-  // order, from first_line[body] on.
+  // The sample paths along the ray in hand, one a leaf of the scene: a line keeps what it has drawn
+  // of whole realisations, and would keep it of every body that it serves.
   std::vector<Line> lines;
-  std::vector<std::size_t> first_line;
-  std::size_t lines_taken = 0;
   std::vector<Line> shadow_lines;
   std::vector<Start> starts;
   TreeSurface::March march;
@@ -181,13 +179,6 @@ TreeHit PathTracer::Impl::first_hit(int b, bool from_inside, std::span<Line> dra
   return surface.first_hit(march, drawn, ray, t_max, {starts.data(), count}, random, *counters);
 }
 
-std::span<Line> PathTracer::Impl::take_lines(int b) {
-  first_line[b] = lines_taken;
-  lines_taken += scene.bodies[b].surface.leaves().size();
-  while (lines.size() < lines_taken) lines.emplace_back().stop_when(stop);
-  return lines_of(b);
-}
-
 // The first surface along the ray: meshes bound the march through each process; the first of the
 // first hits wins (union of independent processes, definitions B5). The nearest body comes first,
 // so that those behind a hit are not entered.
@@ -200,10 +191,9 @@ bool PathTracer::Impl::closest(const Ray& ray, double t_max, Vertex& v) {
       scene.triangles && scene.triangles->intersect(ray, nearest, mesh, *counters);
   if (hit_mesh) nearest = mesh.t;
   path.begin_ray();
-  lines_taken = 0;
   scene.body_boxes.visit(ray, nearest, queue, [&](int b) {
     path.enter(b);
-    const TreeHit hit = first_hit(b, path.inside(b), take_lines(b), ray, nearest, path.states(b),
+    const TreeHit hit = first_hit(b, path.inside(b), lines_of(b), ray, nearest, path.states(b),
                                   path.realisations(b), *rng);
     if (hit.t < nearest) {
       nearest = hit.t;

@@ -264,9 +264,10 @@ def test_fit_of_a_smooth_union(operands):
     assert bpy.ops.gpis.csg_fit(resolution=16, realisations=1000) == {"FINISHED"}
     gn = importlib.import_module("gpis_native")
     fits = [gn.read_vdb(bpy.path.abspath(obj.data.filepath)) for obj in (closed, bpy.context.object)]
-    noise = np.maximum(fits[1]["mean_error"], 1e-6)
-    # Two of three operands are exact; the third adds to Clark's own error.
-    assert np.median(np.abs(fits[0]["mean"] - fits[1]["mean"]) / noise) < 1
+    drawn = fits[1]["mean_error"] > 1e-6
+    # The closed form of the third operand takes the first two for a Gaussian. Of another blend more than a quarter are off.
+    off = np.abs(fits[0]["mean"] - fits[1]["mean"])[drawn] > 5 * fits[1]["mean_error"][drawn]
+    assert drawn.mean() > 0.1 and off.mean() < 0.02
 
 
 def test_compare(operands):
@@ -317,3 +318,26 @@ def test_progress_and_cancelling(operands, extension):
     work.cancel()
     work.join()
     assert work.result is None and work.error is None and work.fraction < 1
+
+
+def test_operands_of_an_instanced_collection(stage, operands, describe):
+    """A list and its operands in a collection that is in the picture by an instance alone: one object, cut as it was made."""
+    a, b, c = operands
+    build(a, ["DIFFERENCE", "UNION"])
+    (entry,), _ = describe()
+    parts = bpy.data.collections.new("Parts")
+    for obj in operands:
+        for collection in obj.users_collection:
+            collection.objects.unlink(obj)
+        parts.objects.link(obj)
+    empty = support.link(stage, "Placed", None, location=(0, 2, 0))
+    empty.instance_type, empty.instance_collection = "COLLECTION", parts
+    bpy.context.view_layer.update()
+    (placed,), warnings = describe()
+    assert placed["name"] == "A" and warnings == []
+    assert np.array(placed["matrix"])[:3, 3] == pytest.approx((0, 2, 0))
+    gn = importlib.import_module("gpis_native")
+    rays = (np.random.default_rng(1).uniform(-1, 1, (200, 3)) + (0, 0, 4), np.tile((0.0, 0.0, -1.0), (200, 1)))
+    linked, instanced = (gn.first_hits(one["process"], *rays, 9.0, seed=3)["t"] for one in (entry, placed))
+    np.testing.assert_array_equal(linked, instanced)
+    assert np.isfinite(linked).mean() > 0.5
