@@ -163,6 +163,7 @@ def values(tmp_path_factory):
         "low": -1.0,
         "major_radius": 1.0,
         "margin": 0.0,
+        "narrow_band": 5.0,
         "matrix": np.eye(4),
         "mean": sphere,
         "meaning": "value",
