@@ -2,13 +2,14 @@
 
 import bpy
 import numpy as np
-from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import EnumProperty, FloatProperty, StringProperty
 from bpy_extras.object_utils import AddObjectHelper, object_data_add
 
 from .. import volume
 from ..native import native
 from . import files, shapes
 from .operators import DEFAULT_LENGTH_SCALE, DEFAULT_SIGMA, automatic_margin
+from .options import NARROW_BAND, RESOLUTION
 
 ENGINE = "GPIS"
 
@@ -47,14 +48,7 @@ class GPIS_OT_add(bpy.types.Operator, AddObjectHelper):
         soft_max=100.0,
         subtype="DISTANCE",
     )
-    resolution: IntProperty(
-        name="Resolution",
-        description="Grid nodes along the longest side of the bounds",
-        default=96,
-        min=8,
-        max=1024,
-        soft_max=256,
-    )
+    resolution: RESOLUTION
     margin: FloatProperty(
         name="Margin",
         description="Room around the shape for the surface (0: 4 σ, at least a tenth of the size)",
@@ -62,13 +56,7 @@ class GPIS_OT_add(bpy.types.Operator, AddObjectHelper):
         min=0.0,
         subtype="DISTANCE",
     )
-    narrow_band: FloatProperty(
-        name="Narrow Band",
-        description="Distances beyond this are not kept: for high resolutions. More than 6 σ, or 0 for the whole box",
-        default=0.0,
-        min=0.0,
-        subtype="DISTANCE",
-    )
+    narrow_band: NARROW_BAND
 
     @classmethod
     def description(cls, context, properties):
@@ -143,21 +131,8 @@ class GPIS_OT_from_volume(bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
     level: FloatProperty(name="Density", description="Of a fog: density at the surface", default=0.1, min=0.0, soft_max=10.0)
-    resolution: IntProperty(
-        name="Resolution",
-        description="Of a fog: grid nodes along the longest side of the bounds",
-        default=96,
-        min=8,
-        max=1024,
-        soft_max=256,
-    )
-    narrow_band: FloatProperty(
-        name="Narrow Band",
-        description="Of a fog: distances beyond this are not kept: for high resolutions. More than 6 σ, or 0 for the whole box",
-        default=0.0,
-        min=0.0,
-        subtype="DISTANCE",
-    )
+    resolution: RESOLUTION
+    narrow_band: NARROW_BAND
 
     @classmethod
     def poll(cls, context):

@@ -8,6 +8,7 @@ from ..native import native
 from ..paint import bake as painting
 from ..sync import meshes
 from . import files
+from .options import NARROW_BAND
 
 # Of the longest side of the mesh. A surface of this roughness is clearly not the mesh any more, and still its shape.
 DEFAULT_SIGMA = 0.02
@@ -163,13 +164,7 @@ class _Bake:
         min=0.0,
         subtype="DISTANCE",
     )
-    narrow_band: FloatProperty(
-        name="Narrow Band",
-        description="Distances beyond this are not kept: for high resolutions. More than 6 σ, or 0 for the whole box",
-        default=0.0,
-        min=0.0,
-        subtype="DISTANCE",
-    )
+    narrow_band: NARROW_BAND
 
     def run(self, bake_one, objects):
         result = {"CANCELLED"}

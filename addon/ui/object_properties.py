@@ -332,4 +332,5 @@ class GPIS_ObjectProperties(bpy.types.PropertyGroup):
         default=0.0,
         min=0.0,
         subtype="DISTANCE",
+        update=_tag,
     )

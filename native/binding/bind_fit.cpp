@@ -124,8 +124,9 @@ operands: GaussianProcesses or CSG trees. op: 'union', 'intersection', 'differen
 (`blend` its radius). bounds: (min (3,), max (3,)); resolution: nodes along the longest side, the first and last on its ends.
 correlation of the operands' noises: 0 independent, 1 shared, between -1 and 1 a mixture (one kernel). method: 'sample' sums up
 joint realisations; 'closed_form' takes Clark's formulas (1961), of a smooth union an integral over the difference of its two
-operands: exact in mean, sigma and gradients for two operands, each further one as if the result so far were normal. Where one operand wins by `certainty` standard deviations it is taken as it is, and
-nothing is drawn; inf draws everywhere. progress(fraction) may return False to cancel: then None.
+operands: exact in mean, sigma and gradients for two operands, each further one as if the result so far were normal. Where one
+operand wins by `certainty` standard deviations it is taken as it is, and nothing is drawn; inf draws everywhere.
+progress(fraction) may return False to cancel: then None.
 
 Returns mean, sigma (X, Y, Z), anisotropy (X, Y, Z, 6), the squared length scales of a squared exponential; mean_error and
 sigma_error, their standard errors; skewness, and kolmogorov, the distance of the distribution to the normal one (0 where nothing

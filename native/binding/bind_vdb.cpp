@@ -234,7 +234,8 @@ name, type ('float', 'vec3s', ...), resolution (3,) nodes of the box of active v
         R"(Writes a new .vdb file from a dict of arrays on the same nodes.
 
 grids: origin (3,), voxel_size (a number or three), and arrays (X, Y, Z), (X, Y, Z, 3), or (X, Y, Z, 6) as 'anisotropy' (entries
-xx,yy,zz,xy,xz,yz, kept as two vector grids). What compose_and_fit returns is such a dict; its counters are left out. Single precision; every node is active, blocks of one value take no memory. ValueError, FileNotFoundError (folder).)");
+xx,yy,zz,xy,xz,yz, kept as two vector grids). What compose_and_fit returns is such a dict; its counters are left
+out. Single precision; every node is active, blocks of one value take no memory. ValueError, FileNotFoundError (folder).)");
   m.def(
       "read_vdb", &read, "path"_a, py::kw_only(), "names"_a = std::vector<std::string>{},
       R"(Grids of a .vdb file as a dict of arrays (X, Y, Z) or (X, Y, Z, 3), 'anisotropy' (X, Y, Z, 6), origin and voxel_size.
@@ -246,9 +247,9 @@ Arrays cover the box of all active voxels of the grids read (`names`, or all of 
       R"(Bakes the signed distance from a triangle mesh, positive outside, into the grid 'mean' of a new .vdb file.
 
 vertices (N, 3), triangles (M, 3) of indices, facing outwards (a mesh that is inside out as a whole is turned). The nodes cover
-the mesh's bounds with `margin` around them, `resolution` of them along the longest side. Distances beyond `narrow_band` (0: none) are cut off there: blocks of such nodes
-take no memory. Keep it above 6 standard deviations, or the random surface fills the space beyond. An open mesh, or one that meets
-itself, is closed where its generalized winding number is 1/2. progress(fraction) may return False to cancel.
+the mesh's bounds with `margin` around them, `resolution` of them along the longest side. Distances beyond `narrow_band` (0: none)
+are cut off there: blocks of such nodes take no memory. Keep it above 6 standard deviations, or the random surface fills the
+space beyond. An open mesh, or one that meets itself, is closed where its generalized winding number is 1/2. progress(fraction) may return False to cancel.
 
 Returns dict(voxel_size, origin (3,), resolution (3,), closed, open_edges, meets_itself, seconds), or None where cancelled (then no file
 is written). closed: without open edges and not meeting itself, so that the distance is exact at every node. ValueError: no triangle with an area,

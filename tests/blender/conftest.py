@@ -127,3 +127,9 @@ def fresh_blender(tmp_path):
 
     yield run
     shutil.rmtree(resources, ignore_errors=True)
+
+
+@pytest.fixture
+def module(extension):
+    """Modules of the installed extension by their name in it."""
+    return lambda name: importlib.import_module(f"{extension}.{name}")

@@ -1,6 +1,5 @@
 """What the overlay shows while a stroke goes on: looked up under the brush alone, and the same as if all were."""
 
-import importlib
 
 import bpy
 import numpy as np
@@ -14,11 +13,6 @@ CASES = [
     ("ANISOTROPY", "COMB"),
     ("ALBEDO", "SET"),
 ]
-
-
-@pytest.fixture
-def module(extension):
-    return lambda name: importlib.import_module(f"{extension}.{name}")
 
 
 @pytest.fixture

@@ -1,6 +1,5 @@
 """The paint tool without a window: what its settings paint, what is under the brush, what the overlay shows."""
 
-import importlib
 from types import SimpleNamespace
 
 import bpy
@@ -9,11 +8,6 @@ import pytest
 from mathutils import Matrix, Vector
 
 CHANNELS = ("MEAN", "DEVIATION", "LENGTH_SCALE", "ANISOTROPY", "ALBEDO")
-
-
-@pytest.fixture
-def module(extension):
-    return lambda name: importlib.import_module(f"{extension}.{name}")
 
 
 @pytest.fixture
