@@ -5,6 +5,12 @@ import numpy as np
 
 CONDITIONS = {"points": [(0, 0, 1)], "values": [0.0]}
 LAMP = {"type": "point", "name": "Lamp", "color": (1, 1, 1), "power": 100.0, "matrix": np.eye(4) + 3 * np.eye(4, k=1)}
+# Radiance 1 from everywhere, as two suns of half of the sky each: a white world that is sampled as lights.
+WHITE_SUNS = [
+    {"type": "sun", "name": name, "matrix": np.diag([1.0, side, side, 1.0]), "power": np.pi, "angle": np.pi, "visible_to_camera": True}
+    for name, side in (("Upper", 1.0), ("Lower", -1.0))
+]
+BLACK = {"color": (0, 0, 0)}
 TRIANGLE = {"vertices": np.array([(-1, -1, 2.0), (1, -1, 2), (0, 1, 2)]), "triangles": np.array([(0, 1, 2)])}
 
 

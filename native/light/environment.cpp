@@ -4,14 +4,20 @@
 // atan2(y, x)/2π, row v = ½ + atan2(z, √(x²+y²))/π of the unit square, row 0 at the bottom.
 // Bilinear between texel centres, wrapped in u.
 //
-// Sampling: the patches between texel centres are chosen by their mean brightness times their solid
-// angle, then a direction uniformly in solid angle within the patch. The density is thus constant
-// per patch, without a singularity at the poles, and positive wherever the bilinear image is.
+// Sampling: the patches between texel centres are chosen by their solid angle times what their mean
+// brightness exceeds that of the whole sky by, then a direction uniformly in solid angle within the
+// patch. The density is constant per patch, without a singularity at the poles. Where it is zero,
+// light is found by scattering alone, which is as good there: MIS needs only one of the two
+// densities (Karlík et al. 2019, "MIS compensation").
 #include "light/light.h"
 #include "light/piecewise.h"
 
 namespace gpis {
 namespace {
+
+// The relative variance of brightness over the sphere below which a sky is even. Measured at
+// spheres (Lambert and mirror) under skies exp(k z).
+constexpr double kEvenSky = 0.5;
 
 class ConstantEnvironment final : public Light {
  public:
@@ -39,23 +45,33 @@ class ImageEnvironment final : public Light {
         image_(image),
         to_world_(image_to_world),
         strength_(strength) {
+    std::vector<double> brightness;
+    double sum = 0, squares = 0;
+    for (int j = 0; j <= height; ++j) {
+      const double share = band(j) / (2 * width);  // of the sphere
+      for (int i = 0; i < width; ++i) {
+        double b = 0;
+        for (const Color& c : {texel(i, j - 1), texel(i + 1, j - 1), texel(i, j), texel(i + 1, j)})
+          b += luminance({std::abs(c.x), std::abs(c.y), std::abs(c.z)}) / 4;
+        brightness.push_back(b);
+        sum += b * share;
+        squares += b * b * share;
+      }
+    }
+    const double variance = std::max(0.0, squares - sum * sum);
+    mean_ = variance > kEvenSky * sum * sum ? sum * strength : 0;
+
     std::vector<Piecewise1D> rows;
     std::vector<double> row(width);
     for (int j = 0; j <= height; ++j) {
-      const double band = sin_latitude(j + 1) - sin_latitude(j);
-      for (int i = 0; i < width; ++i) {
-        // Absolute values: a patch where the image is not black must not have density zero.
-        double brightness = 0;
-        for (const Color& c : {texel(i, j - 1), texel(i + 1, j - 1), texel(i, j), texel(i + 1, j)})
-          brightness += luminance({std::abs(c.x), std::abs(c.y), std::abs(c.z)}) / 4;
-        row[i] = brightness * band;
-      }
+      for (int i = 0; i < width; ++i)
+        row[i] = std::max(0.0, brightness[j * width + i] - sum) * band(j);
       rows.emplace_back(row);
     }
     patches_.emplace(std::move(rows));
-    mean_ = patches_->sum() * strength / (2 * width);
   }
 
+  // An even sky is not sampled: what a shadow ray adds to what scattering finds is not worth it.
   double power(double r) const override { return mean_ * 4 * kPi * kPi * r * r; }
   std::optional<LightSample> sample(const Vec3&, SquarePoint at) const override {
     const auto [i, j] = patches_->sample(at);
@@ -77,14 +93,14 @@ class ImageEnvironment final : public Light {
   double sin_latitude(int j) const {
     return j <= 0 ? -1 : j > height_ ? 1 : std::sin(kPi * ((j - 0.5) / height_ - 0.5));
   }
+  double band(int j) const { return sin_latitude(j + 1) - sin_latitude(j); }
   Color texel(int i, int j) const {
     const std::size_t row = std::clamp(j, 0, height_ - 1), column = i % width_;
     const float* p = image_ + 3 * (row * width_ + column);
     return {p[0], p[1], p[2]};
   }
   double density(int i, int j) const {
-    return patches_->probability(i, j) * width_ /
-           (2 * kPi * (sin_latitude(j + 1) - sin_latitude(j)));
+    return patches_->probability(i, j) * width_ / (2 * kPi * band(j));
   }
   // Radiance and sampling density towards a direction of image space.
   std::pair<Color, double> look_up(const Vec3& d) const {

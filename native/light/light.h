@@ -57,7 +57,8 @@ double area_of(const Vec3& u, const Vec3& v, bool ellipse);
 
 // The world. A constant colour is not sampled (power 0): following the BRDF is as good.
 std::unique_ptr<Light> make_constant_environment(const Color& radiance);
-// Equirectangular image (scene/description.h) with importance sampling of luminance.
+// Equirectangular image (scene/description.h) with importance sampling of what is brighter than the
+// mean; an even one is not sampled either.
 std::unique_ptr<Light> make_image_environment(int width, int height, const float* image,
                                               const Mat3& image_to_world, double strength);
 

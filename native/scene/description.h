@@ -25,7 +25,7 @@ struct SettingsDescription {
   enum class Filter { box, blackman_harris } filter = Filter::box;
   double filter_width = 1;
   double clamp = 0;            // 0 = off
-  bool light_sampling = true;  // next-event estimation; a constant world colour is never sampled
+  bool light_sampling = true;  // next-event estimation; an even world is never sampled
 };
 
 struct CameraDescription {

@@ -56,7 +56,7 @@ Rows Scene::plan() const {
           ? "on: " + std::to_string(impl_->lights.groups()) +
                 " shadow rays at every surface that is not a deterministic mirror or glass"
       : d.settings.light_sampling
-          ? "left out: nothing to sample (a constant world is met by following the BRDF)"
+          ? "left out: nothing to sample (an even world is met by following the BRDF)"
           : "off by settings.light_sampling");
   const std::size_t transparent = count(impl_->bodies, [&](const auto& body) {
     return leaves[body.first].material->relative_index() != 0;
@@ -67,7 +67,9 @@ Rows Scene::plan() const {
                                         : "left out: no body is a dielectric");
   rows.emplace_back("scene.world", d.world.black()         ? "left out: black"
                                    : d.world.image.empty() ? "constant colour"
-                                                           : "image, sampled by brightness");
+                                   : impl_->lights.probability(d.lights.size()) > 0
+                                       ? "image; what is brighter than its mean is sampled"
+                                       : "image, too even to be sampled");
   needed("textures", count(d.objects, [](const auto& o) { return o.albedo != nullptr; }),
          "objects look an albedo up where a ray meets them", "no object has a painted albedo");
   rows.emplace_back("scene.motion", "left out: nothing moves while the shutter is open");

@@ -90,6 +90,20 @@ inline void set_world_image(SceneDescription& scene, int width, int height, doub
   scene.world.image.assign(3ull * width * height, static_cast<float>(value));
 }
 
+// Radiance 1 from everywhere, as two suns of half of the sky each: sampled as lights, unlike an
+// even sky.
+inline void set_white_suns(SceneDescription& scene) {
+  scene.world.color = {};
+  for (const double side : {1.0, -1.0}) {
+    LightDescription sun;
+    sun.type = LightDescription::Type::sun;
+    sun.matrix.linear.row[1].y = sun.matrix.linear.row[2].z = side;
+    sun.power = sun.angle = kPi;
+    sun.visible_to_camera = true;
+    scene.lights.push_back(sun);
+  }
+}
+
 // A sphere of radius 1 as a distance mean.
 inline std::shared_ptr<GaussianProcess> sphere_process(double length_scale, double sigma,
                                                        const Vec3& center = {}) {

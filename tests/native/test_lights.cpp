@@ -139,6 +139,42 @@ TEST(light_samplers_follow_their_density) {
   }
 }
 
+TEST(both_ways_to_find_a_sky_add_up) {
+  // What is darker than the mean is found by scattering alone, an even sky wholly.
+  const auto spot = gradient_image(16, 8);
+  auto even = spot;
+  for (int k = 0; k < 3; ++k) even[3 * (2 * 16 + 5) + k] = 0.4f;
+  std::vector<float> half(3 * 16 * 8, 1);
+  std::fill(half.begin(), half.begin() + 3 * 16 * 4, 0.f);
+  for (const auto& [image, sampled] : {std::pair{spot, true}, {even, false}, {half, true}}) {
+    LightSet set;
+    set.add(make_image_environment(16, 8, image.data(), some_rotation(), 2), true);
+    set.finish(3, true);
+    CHECK(set.groups(), ==, sampled);
+    Rng rng(4, 0);
+    Mean both, scattered;
+    int unsampled = 0;
+    for (int n = 0; n < 100'000; ++n) {
+      const double pdf = 1 / (4 * kPi);  // of scattering into any direction
+      const Vec3 to{rng.normal(), rng.normal(), rng.normal()};
+      const Ray ray{{}, normalize(to)};
+      const double found = set.met(ray, kInfinity, pdf).x / pdf;
+      scattered.add(set.met(ray, kInfinity, kInfinity).x / pdf);
+      unsampled += found == set.met(ray, kInfinity, kInfinity).x / pdf;
+      double lit = 0;
+      if (sampled) {
+        const auto light = set.sample(0, {}, square_point(rng));
+        lit = light->radiance.x * balance(light->pdf, pdf) / light->pdf;
+      }
+      both.add(found + lit);
+    }
+    CHECK(std::abs(both.mean() - scattered.mean()), <,
+          4 * std::hypot(both.error(), scattered.error()));
+    CHECK(unsampled, >, sampled ? 30'000 : 99'999);
+    if (sampled) CHECK(both.error(), <, 0.8 * scattered.error());
+  }
+}
+
 TEST(lights_shine_on_one_side) {
   const auto area = make_area({0, 0, 2}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, false, {1, 1, 1});
   Rng rng(1, 0);

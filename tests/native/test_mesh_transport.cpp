@@ -26,7 +26,7 @@ TEST(mesh_furnace_is_exactly_one) {
     for (const bool image : {false, true}) {
       context() = std::string(smooth ? "smooth" : "flat") + (image ? ", light sampling" : "");
       SceneDescription s = bowl_and_spheres(smooth);
-      if (image) set_world_image(s, 8, 4, 1);
+      if (image) set_white_suns(s);
       const Render r = trace(
           s,
           [](Rng& rng) {

@@ -45,7 +45,7 @@ TEST(process_furnace_is_one) {
                       ", sigma/l " + std::to_string(ratio) + (sampling ? ", light sampling" : "");
           SceneDescription s = sphere_scene(0.1, 0.1 * ratio, memory, material(type, 1));
           if (sampling) {
-            set_world_image(s, 8, 4, 1);
+            set_white_suns(s);
           } else {
             s.world.color = {1, 1, 1};
           }
@@ -182,7 +182,7 @@ TEST(overlapping_surfaces_keep_the_furnace) {
       SceneDescription s;
       s.materials = {lambert(1), material(Type::mirror, 1)};
       if (sampling) {
-        set_world_image(s, 8, 4, 1);
+        set_white_suns(s);
       } else {
         s.world.color = {1, 1, 1};
       }
@@ -210,7 +210,7 @@ TEST(glass_bodies_keep_the_furnace) {
                      material(Type::dielectric, 1)};
       s.materials[3].ior = 1.2;
       if (sampling) {
-        set_world_image(s, 8, 4, 1);
+        set_white_suns(s);
       } else {
         s.world.color = {1, 1, 1};
       }

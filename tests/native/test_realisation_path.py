@@ -4,6 +4,7 @@ one for a whole path (memory global). Oracles of the design, numbered as there."
 import gpis_native as gn
 import numpy as np
 import pytest
+from scene_parts import BLACK, WHITE_SUNS
 from statistics_checks import Z_LIMIT, check_proportion, check_z
 
 pytestmark = pytest.mark.stats
@@ -206,21 +207,21 @@ def test_global_furnace(material, seed):
 
 def test_mirrors_know_their_gradient(seed):
     """Under global a mirror is a delta: no light is sampled from it, and it finds the same light by reflection."""
-    sky = {"image": np.ones((4, 8, 3))}
-    result = gn.render(gn.Scene(scene("global", "mirror", world=sky)), 8, 8, samples=16, seed=seed)
+    white = {"world": BLACK, "lights": WHITE_SUNS}
+    result = gn.render(gn.Scene(scene("global", "mirror", **white)), 8, 8, samples=16, seed=seed)
     assert result.stats["shadow_rays"] == 0 and np.allclose(result.passes["combined"], 1, atol=1e-6)
-    result = gn.render(gn.Scene(scene("global", "lambert", world=sky)), 8, 8, samples=64, seed=seed)
+    result = gn.render(gn.Scene(scene("global", "lambert", **white)), 8, 8, samples=64, seed=seed)
     assert result.stats["shadow_rays"] > 0
     pixels, variance = (result.passes[p][..., 0].astype(float) for p in ("combined", "variance"))
     assert abs(pixels.mean() - 1) < Z_LIMIT * np.sqrt(variance.sum()) / pixels.size + 1e-6
 
 
 def test_global_beside_renewal_plus(seed, full_size):
-    """Albedo ½ under a gradient. Renewal+ forgets what it passed, so the two need not agree: they do to .02 here."""
-    gradient = {"image": np.linspace(0, 1, 32)[:, None, None] * np.ones((32, 8, 3))}
+    """Albedo ½ under a gradient and half a sky. Renewal+ forgets what it passed, so the two need not agree: they do to .02 here."""
+    light = {"world": {"image": np.linspace(0, 1, 32)[:, None, None] * np.ones((32, 8, 3))}, "lights": WHITE_SUNS[:1]}
     means = []
     for memory in ("global", "renewal+"):
-        described = scene(memory, "lambert", world=gradient, color=0.5)
+        described = scene(memory, "lambert", color=0.5, **light)
         result = gn.render(gn.Scene(described), 12, 12, samples=256 if full_size else 64, seed=seed)
         image, variance = (result.passes[p][..., 0].astype(float) for p in ("combined", "variance"))
         means.append((image.mean(), np.sqrt(variance.sum()) / image.size))

@@ -3,6 +3,7 @@ independent processes is what they are as separate objects."""
 
 import numpy as np
 import pytest
+from scene_parts import BLACK, WHITE_SUNS
 from statistics_checks import check_z
 
 gn = pytest.importorskip("gpis_native")
@@ -33,7 +34,7 @@ TREES = {
 }
 
 
-def seen(process, materials, *, memory="renewal+", world=None, settings=None, width=2.4):
+def seen(process, materials, *, memory="renewal+", world=None, lights=(), settings=None, width=2.4):
     """From z = 4, orthographic."""
     eye = np.eye(4)
     eye[2, 3] = 4
@@ -43,6 +44,7 @@ def seen(process, materials, *, memory="renewal+", world=None, settings=None, wi
         "settings": settings or {},
         "camera": {"type": "orthographic", "matrix": eye, "width": width},
         "world": world or {"color": (1, 1, 1)},
+        "lights": list(lights),
         "materials": {
             "white": {"type": "lambert", "color": (1, 1, 1)},
             "mirror": {"type": "mirror", "color": (1, 1, 1)},
@@ -90,8 +92,7 @@ def test_furnace_of_global(name, material, seed):
 @pytest.mark.parametrize("material", ["white", "mirror"])
 @pytest.mark.parametrize("name", ["nested", "smooth"])
 def test_furnace_with_light_sampling(name, material, memory, seed):
-    world = {"image": np.ones((4, 8, 3))}
-    scene = gn.Scene(seen(TREES[name], [material], memory=memory, world=world))
+    scene = gn.Scene(seen(TREES[name], [material], memory=memory, world=BLACK, lights=WHITE_SUNS))
     result = gn.render(scene, 16, 16, samples=512, seed=seed)
     pixels, variance = (result.passes[p][..., 0].astype(float) for p in ("combined", "variance"))
     assert result.stats["shadow_rays"] > 10_000
@@ -104,10 +105,10 @@ def test_furnace_with_light_sampling(name, material, memory, seed):
 @pytest.mark.parametrize("memory", MEMORIES)
 def test_union_is_its_operands_as_objects(memory, seed):
     """Definitions B5: overlapping objects are the union of independent processes, at camera and at every bounce."""
-    world = {"image": np.linspace(0, 1, 16)[:, None, None] * np.ones((16, 8, 3))}
+    light = {"world": {"image": np.linspace(0, 1, 16)[:, None, None] * np.ones((16, 8, 3))}, "lights": WHITE_SUNS[:1]}
     means = []
     for i, process in enumerate([gn.union(a, b), [a, b]]):
-        result = gn.render(gn.Scene(seen(process, ["grey"], memory=memory, world=world)), 12, 12, samples=512, seed=seed + i)
+        result = gn.render(gn.Scene(seen(process, ["grey"], memory=memory, **light)), 12, 12, samples=512, seed=seed + i)
         pixels, variance = (result.passes[p][..., 0].astype(float) for p in ("combined", "variance"))
         means.append((pixels.mean(), variance.sum() / variance.size**2))
     (tree, var_tree), (objects, var_objects) = means

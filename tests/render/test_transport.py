@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scene_parts import BLACK, WHITE_SUNS
 from statistics_checks import Z_LIMIT, check_z
 
 gn = pytest.importorskip("gpis_native")
@@ -10,7 +11,7 @@ LENGTH_SCALE = 0.1
 MEMORIES = ["none", "renewal", "renewal+"]
 
 
-def sphere(sigma, material, *, memory="renewal+", sampler="auto", world=None, color=(1, 1, 1), settings=None, fov=0.6):
+def sphere(sigma, material, *, memory="renewal+", sampler="auto", world=None, lights=(), color=(1, 1, 1), settings=None, fov=0.6):
     """A unit sphere seen from (0, 0, 4)."""
     eye = np.eye(4)
     eye[2, 3] = 4
@@ -23,6 +24,7 @@ def sphere(sigma, material, *, memory="renewal+", sampler="auto", world=None, co
         "settings": settings or {},
         "camera": {"type": "perspective", "matrix": eye, "fov_x": fov},
         "world": world or {"color": (1, 1, 1)},
+        "lights": list(lights),
         "materials": {"surface": {"type": material, "color": color}},
         "objects": [
             {
@@ -60,8 +62,8 @@ def test_furnace_without_light_sampling_is_exact(ratio, material, memory, seed):
 @pytest.mark.parametrize("material", ["lambert", "mirror"])
 @pytest.mark.parametrize("ratio", [0.5, 2.0])
 def test_furnace_with_light_sampling(ratio, material, memory, seed, full_size):
-    # The white world as an image is sampled as a light, which makes noise.
-    scene = sphere(ratio * LENGTH_SCALE, material, memory=memory, world={"image": np.ones((4, 8, 3))})
+    # A white world of two suns is sampled as lights, which makes noise.
+    scene = sphere(ratio * LENGTH_SCALE, material, memory=memory, world=BLACK, lights=WHITE_SUNS)
     result = gn.render(gn.Scene(scene), 24, 24, samples=2048 if full_size else 768, seed=seed)
     pixels = result.passes["combined"][..., 0].astype(float)
     error = np.sqrt(result.passes["variance"][..., 0].astype(float))
@@ -76,10 +78,12 @@ def test_furnace_with_light_sampling(ratio, material, memory, seed, full_size):
 @pytest.mark.stats
 @pytest.mark.parametrize("material", ["lambert", "mirror", "conductor"])
 def test_both_samplers_agree_under_a_gradient(material, seed, full_size):
-    """Oracle 13's pair: albedo .5 under a world that is a linear gradient, pixel by pixel."""
-    gradient = np.linspace(0, 1, 32)[:, None, None] * np.ones((32, 8, 3))
+    """Oracle 13's pair: albedo .5 under a world that is a linear gradient and half a sky of sun, pixel by pixel: light that is
+    found by scattering alone, and light that is sampled as well."""
+    world = {"image": np.linspace(0, 1, 32)[:, None, None] * np.ones((32, 8, 3))}
+    more = {"color": (0.5, 0.5, 0.5), "world": world, "lights": WHITE_SUNS[:1]}
     scenes = [
-        sphere(0.5 * LENGTH_SCALE, material, sampler=sampler, color=(0.5, 0.5, 0.5), world={"image": gradient})
+        sphere(0.5 * LENGTH_SCALE, material, sampler=sampler, **more)
         for sampler in ("convolution", "dense")
     ]
     samples = 1024 if full_size else 256
