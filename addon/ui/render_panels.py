@@ -164,7 +164,7 @@ class GPIS_PT_plan(_OfLastRender, bpy.types.Panel):
                 continue
             column = body.column(align=True)
             for name, sentence in rows.items():
-                title = name.replace("_", " ").capitalize()
+                title = name.replace("_", " ").capitalize().replace("Csg", "CSG")
                 if sentence.startswith(LEFT_OUT):
                     left_out.append(f"{title}: {sentence.removeprefix(LEFT_OUT)}")
                 else:
