@@ -11,6 +11,7 @@ from .text import wrapped
 
 ENGINE = "GPIS"
 LEFT_OUT = "left out: "
+SHOWN_ABOVE = {"width", "height", "seconds", "samples", "estimated_error"}  # counts that the panel says in words
 # Of the plot in a panel, in icons: one pixel of the picture is one of a screen without scaling.
 PLOT_SCALE = error_plot.SIZE / 20
 
@@ -145,8 +146,8 @@ class GPIS_PT_counts(_OfLastRender, bpy.types.Panel):
     def content(self, layout, context):
         column = layout.column(align=True)
         for name, value in statistics.last(context.scene.name)["stats"].items():
-            if value and not isinstance(value, (list, dict)):  # those are for the file
-                _row(column, name.replace("_", " "), _number(value))
+            if value and name not in SHOWN_ABOVE and not isinstance(value, (list, dict)):  # those are for the file
+                _row(column, name.replace("_", " "), _number(value), factor=0.62)
 
 
 class GPIS_PT_plan(_OfLastRender, bpy.types.Panel):
@@ -213,8 +214,8 @@ def _number(value):
     return f"{value:,}" if isinstance(value, int) else str(value)
 
 
-def _row(column, name, text):
-    split = column.split(factor=0.4)
+def _row(column, name, text, factor=0.4):
+    split = column.split(factor=factor)
     split.alignment = "RIGHT"
     split.label(text=name)
     split.label(text=text)
