@@ -204,6 +204,16 @@ def test_shells_stand_off_by_the_deviation(module, sphere):
         np.testing.assert_allclose(way, side * deviation, atol=1e-12)
 
 
+def test_a_legend_gets_room_beyond_what_leaves_it(module):
+    widened = module("viewport.colour").widened
+    low, high = module("viewport.colour").log_range(np.array([0.3, 0.33]))
+    assert high == pytest.approx(2 * low) and low < 0.3 and high > 0.33, "noise of equal values is not all colours"
+    assert widened((1.0, 4.0), np.array([0.995, 2.0, 4.03])) == (1.0, 4.0), "as good as on it"
+    assert widened((1.0, 4.0), np.array([0.8, 2.0])) == (0.4, 4.0)
+    assert widened((1.0, 4.0), np.array([2.0, 6.0])) == (1.0, 12.0)
+    assert widened((1.0, 4.0), np.array([0.0, np.inf])) == (1.0, 4.0) and widened((1.0, 4.0), np.array([])) == (1.0, 4.0)
+
+
 def test_a_value_off_the_legend_makes_a_new_one(module, sphere, drawn):
     brush = bpy.context.scene.gpis.paint
     brush.channel, brush.sigma = "DEVIATION", 0.2

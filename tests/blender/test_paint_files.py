@@ -32,8 +32,9 @@ def test_save_as_copies_and_a_moved_folder(painted_sphere, gn, tmp_path):
     assert not np.array_equal(grids_of(gn, obj)["sigma"], expected)
 
 
-@pytest.mark.parametrize("link", [True, False], ids=["linked", "appended"])
-def test_linked_and_appended(painted_sphere, gn, tmp_path, link):
+@pytest.mark.parametrize("how", ["linked", "overridden", "appended"])
+def test_linked_and_appended(painted_sphere, gn, tmp_path, how):
+    link = how != "appended"
     paint("DEVIATION", "SET", arc(2), value=0.2)
     name, strokes, expected = painted_sphere.name, painted_sphere.data.gpis_strokes, grids_of(gn, painted_sphere)["sigma"]
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"))
@@ -44,13 +45,17 @@ def test_linked_and_appended(painted_sphere, gn, tmp_path, link):
         wanted.objects = [name]
     (obj,) = wanted.objects
     bpy.context.collection.objects.link(obj)
+    if how == "overridden":
+        obj = obj.override_create(remap_local_usages=True)
     bpy.context.view_layer.objects.active = obj
     assert obj.data.gpis_strokes == strokes
     path = Path(os.path.normpath(bpy.path.abspath(obj.data.filepath, library=obj.data.library)))
     assert np.array_equal(gn.read_vdb(path, names=["mean", "sigma"])["sigma"], expected)
     if link:
-        with pytest.raises(RuntimeError, match="is linked from another file: make it local"):
-            paint("DEVIATION", "ADD", arc(2), value=2.0)
+        sentence = "is linked from another file" if how == "linked" else "is a library override, of which Blender does not save"
+        for channel, operation in (("DEVIATION", "ADD"), ("CONDITION", "PIN")):
+            with pytest.raises(RuntimeError, match=f"{sentence}.*make it local"):
+                paint(channel, operation, arc(2), value=2.0)
         # Local, with data that is not: it gets data and a file of its own, and the library keeps its.
         obj.select_set(True)
         bpy.ops.object.make_local(type="SELECT_OBJECT")
