@@ -111,6 +111,19 @@ def test_ellipses_appear_where_it_is_combed(module, sphere):
     np.testing.assert_allclose(hand.look.ellipses, hand.whole().ellipses, rtol=0, atol=1e-12)
 
 
+def test_ellipses_are_spread_evenly(module, stage):
+    """None upon another one, and no bare places."""
+    bpy.ops.gpis.add(kind="SPHERE", radius=2.0, resolution=96)
+    surface, channels = module("viewport.surface").of(bpy.context.object), module("viewport.channels")
+    places = surface.vertices[channels.some_vertices(surface)]
+    assert 1000 < len(places) < 1800
+    square = np.sqrt(4 * np.pi * 2.0**2 / len(places))
+    apart = np.linalg.norm(places[:, None] - places, axis=2)
+    assert np.min(apart + 10 * np.eye(len(places))) > 0.25 * square
+    bare = np.linalg.norm(surface.vertices[::7, None] - places, axis=2).min(axis=1)
+    assert bare.max() < 1.1 * square
+
+
 def test_a_move_beside_the_surface_asks_nothing(module, sphere):
     brush = bpy.context.scene.gpis.paint
     brush.channel = "DEVIATION"
