@@ -44,6 +44,11 @@ def check(obj):
         raise ValueError(f"{owner} is switched off: switch GPIS on in its Object properties.")
     if obj.library is not None:
         raise ValueError(f"{owner} is linked from another file: make it local (Object, Relations, Make Local).")
+    if obj.override_library is not None:
+        raise ValueError(
+            f"{owner} is a library override, of which Blender does not save what is painted: make it local (Object, "
+            "Relations, Make Local)."
+        )
     if obj.data.is_sequence:
         raise ValueError(f"{owner} shows a sequence of files: paint on a single one.")
     if not obj.gpis.mean_grid:

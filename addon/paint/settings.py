@@ -69,6 +69,14 @@ _FALLOFFS = (
     ("CUSTOM", "Custom", "The curve below: from the centre, left, to the rim", "RNDCURVE", 9),
 )
 
+# Of the object's own σ and ℓ: what the brushes paint until the artist says how much. Rougher and finer than what is there,
+# to be seen on an object of any size.
+_SHARES = {"sigma": 2.5, "length_scale": 0.5}
+# Of an object that is no GPIS.
+_LENGTH = 0.1
+
+_PIXELS = 50.0
+
 # Metres (object units of an object without scale) that a pixel is where the brush was last over a surface.
 _metres_per_pixel = 0.01
 
@@ -86,7 +94,7 @@ def pixel_size():
 def _read_pixels(settings):
     if settings.radius_unit == "SCENE":
         return settings.radius / _metres_per_pixel
-    return settings.get("pixels", 50.0)
+    return settings.get("pixels", _PIXELS)
 
 
 def _write_pixels(settings, value):
@@ -94,6 +102,32 @@ def _write_pixels(settings, value):
         settings.radius = value * _metres_per_pixel
     else:
         settings["pixels"] = value
+
+
+def length_for(settings, name, obj):
+    """`sigma` or `length_scale` of the brush in units of an object: the artist's, or else a share of what the object has."""
+    chosen = settings.get(name, 0.0)
+    if chosen > 0:
+        return chosen
+    return _SHARES[name] * getattr(obj.gpis, name) if obj is not None and obj.gpis.enabled else _LENGTH
+
+
+def _length(name):
+    """get and set of a length that follows the active object while it is 0, as it is until one is typed."""
+
+    def read(settings):
+        return length_for(settings, name, getattr(bpy.context, "active_object", None))
+
+    def write(settings, value):
+        settings[name] = max(value, 0.0)
+
+    return {"get": read, "set": write}
+
+
+def _on_radius_unit(settings, context):
+    # As large as it was on the screen, until there is a radius of the scene.
+    if settings.radius_unit == "SCENE" and not settings.is_property_set("radius"):
+        settings.radius = settings.get("pixels", _PIXELS) * _metres_per_pixel
 
 
 def _on_falloff(settings, context):
@@ -136,23 +170,23 @@ class GPIS_PaintProperties(bpy.types.PropertyGroup):
     )
     sigma: FloatProperty(
         name="σ",
-        description="Standard deviation to paint, in object units",
-        default=0.1,
-        min=1e-6,
+        description="Standard deviation to paint, in object units. 0: two and a half times that of the object",
+        min=0.0,
         soft_max=10.0,
         precision=4,
         step=1,
         subtype="DISTANCE",
+        **_length("sigma"),
     )
     length_scale: FloatProperty(
         name="ℓ",
-        description="Length scale to paint, in object units",
-        default=0.1,
-        min=1e-6,
+        description="Length scale to paint, in object units. 0: half of that of the object",
+        min=0.0,
         soft_max=100.0,
         precision=4,
         step=1,
         subtype="DISTANCE",
+        **_length("length_scale"),
     )
     factor: FloatProperty(
         name="Factor", description="What a dab multiplies by, at full strength", default=1.2, min=1.0, max=10.0, precision=3
@@ -180,6 +214,7 @@ class GPIS_PaintProperties(bpy.types.PropertyGroup):
         description="Whether the brush keeps its size on the screen or in the scene",
         items=(("VIEW", "View", "Pixels of the screen"), ("SCENE", "Scene", "Metres on the surface")),
         default="VIEW",
+        update=_on_radius_unit,
     )
     view_radius: FloatProperty(
         name="Radius",
@@ -300,7 +335,7 @@ class GPIS_PaintProperties(bpy.types.PropertyGroup):
             if self.channel == "ALBEDO":
                 return (1.0, 1.0, 1.0) if inverted else tuple(self.color)
             name = "sigma" if self.channel == "DEVIATION" else "length_scale"
-            return getattr(obj.gpis if inverted else self, name)
+            return getattr(obj.gpis, name) if inverted else length_for(self, name, obj)
         return None
 
     def _curve(self):

@@ -52,7 +52,7 @@ class GPISPaintTool(bpy.types.WorkSpaceTool):
                 row.ui_units_x = 9 if value == "ratios" else 5
                 row.prop(brush, value, text="" if value in {"ratios", "color"} else None, slider=value == "ratios")
         row = layout.row(align=True)
-        row.ui_units_x = 6
+        row.ui_units_x = 6.5
         scene_unit = brush.radius_unit == "SCENE"
         row.prop(brush, "radius" if scene_unit else "view_radius", text="Radius")
         row.prop(brush, "radius_unit", text="", icon="WORLD" if scene_unit else "RESTRICT_VIEW_OFF", icon_only=True)

@@ -80,8 +80,20 @@ def ratio(entries):
 
 
 def some_vertices(surface):
-    """Indices of the vertices at which bumps are drawn."""
-    return np.random.default_rng(0).permutation(len(surface.vertices))[:_ELLIPSES]
+    """Indices of the vertices at which bumps are drawn, spread evenly: of each cell of a coarse grid through whose middle
+    the surface goes, the one nearest to it."""
+    if len(surface.vertices) <= _ELLIPSES:
+        return np.arange(len(surface.vertices))
+    a, b, c = (surface.vertices[surface.triangles[:, i]] for i in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+    # A ball of diameter 1 in each of the cells: as many of them are met as the area has squares of their size.
+    places = (surface.vertices - surface.low) / np.sqrt(area / _ELLIPSES)
+    cells = np.floor(places).astype(int)
+    off = np.linalg.norm(places - cells - 0.5, axis=1)
+    order = np.lexsort((off, *cells.T))
+    new = np.append(True, np.any(np.diff(cells[order], axis=0) != 0, axis=1))
+    nearest = order[new]
+    return np.sort(nearest[off[nearest] < 0.5])
 
 
 def ellipses(fields, surface, chosen):

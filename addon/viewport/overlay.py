@@ -15,11 +15,11 @@ _SHELL_OPACITY = 0.22
 _ELLIPSES = (0.05, 0.05, 0.05, 0.9)
 _PINS = (1.0, 0.35, 0.1, 1.0)
 
-# The stroke that is being painted: (name of the object, its live fields, symmetry), or None; and its dabs since the
+# The stroke that is being painted: (full name of the object, its live fields, symmetry), or None; and its dabs since the
 # object was drawn last.
 _live = None
 _new = Dabs()
-# name of the object -> _Drawn; made again when what it shows has changed.
+# full name of the object (a linked one may be called the same) -> _Drawn; made again when what it shows has changed.
 _drawn = {}
 _handles = []
 
@@ -46,7 +46,7 @@ class _Drawn:
 def painting(obj, fields, dabs, symmetry):
     """Show these fields for the object, as they are now, until `painted`. `dabs`: what changed since the last call."""
     global _live, _new
-    _live, _new = (obj.name, fields, symmetry), _new + dabs
+    _live, _new = (obj.name_full, fields, symmetry), _new + dabs
     tag_redraw()
 
 
@@ -98,7 +98,7 @@ def _draw_view():
 def _draw_pixels():
     context = bpy.context
     obj = context.active_object
-    drawn = _drawn.get(obj.name) if obj is not None else None
+    drawn = _drawn.get(obj.name_full) if obj is not None else None
     if drawn is not None and drawn.look.legend is not None and tool_is_active(context) and obj in set(_shown(context)):
         legend.draw_legend(context, drawn.look.legend)
 
@@ -109,7 +109,7 @@ def _refreshed(context, obj, found):
     global _new
     brush = context.scene.gpis.paint
     active = obj == context.active_object and tool_is_active(context)
-    live = _live is not None and _live[0] == obj.name
+    live = _live is not None and _live[0] == obj.name_full
     settings = obj.gpis
     sampled = sampling.of(context, obj) if active and brush.show_realisation and not live else None
     if sampled is not None and sampled.vertices is None:
@@ -123,7 +123,7 @@ def _refreshed(context, obj, found):
         len(settings.conditions),
         sampled and sampled.key,
     )
-    drawn = _drawn.get(obj.name)
+    drawn = _drawn.get(obj.name_full)
     known = drawn is not None and (not active or channels.holds(drawn.look.legend, brush))
     dabs = Dabs()
     if live:
@@ -136,7 +136,7 @@ def _refreshed(context, obj, found):
     shape = sampled or found
     kept = drawn.look.legend if known and live and drawn.key[1] == key[1] else None
     look = Look(context.scene, brush, fields, found, shape, moved=live, legend=kept)
-    drawn = _drawn[obj.name] = _Drawn(key, look, shape, found)
+    drawn = _drawn[obj.name_full] = _Drawn(key, look, shape, found)
     if fields is not None and brush.channel == "CONDITION":
         drawn.pins = channels.pins(settings.conditions, found)
     return drawn

@@ -50,19 +50,19 @@ class Sampling:
 def of(context, obj):
     """The Sampling of an object as it is now, perhaps not done yet; None where it has no process (the render says why)."""
     key = _key(obj)
-    known = _of.get(obj.name)
+    known = _of.get(obj.name_full)
     if known is not None:
         if known.key == key:
             return known
         known.stop()
     try:
         process = sync.gpis.process_of(sync.Sync(context.evaluated_depsgraph_get()), obj)
-        _of[obj.name] = Sampling(key, process, sync.gpis.bounds_of(obj))
+        _of[obj.name_full] = Sampling(key, process, sync.gpis.bounds_of(obj))
     except (ValueError, OSError, RuntimeError):
         return None
     if not bpy.app.timers.is_registered(_poll):
         bpy.app.timers.register(_poll, first_interval=_POLL)
-    return _of[obj.name]
+    return _of[obj.name_full]
 
 
 def _key(obj):

@@ -56,6 +56,18 @@ def test_a_narrow_band_is_kept_and_watched(gn, stage, describe, kind):
         bpy.ops.gpis.add(kind=kind, radius=1.0, resolution=64, narrow_band=0.05)
 
 
+def test_a_narrow_band_from_a_mesh_and_from_a_fog(gn, stage, tmp_path):
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24)
+    assert bpy.ops.gpis.make(resolution=64, margin=0.8, narrow_band=0.3) == {"FINISHED"}
+    of_mesh = bpy.context.object
+    of_fog = fog(gn, tmp_path / "fog.vdb")
+    assert bpy.ops.gpis.from_volume(level=0.4, resolution=48, narrow_band=0.1) == {"FINISHED"}
+    for obj, radius, band in ((of_mesh, 1.0, 0.3), (of_fog, 0.6, 0.1)):
+        assert obj.gpis.bake_narrow_band == pytest.approx(band)
+        mean = mean_of(gn, obj)([(radius, 0, 0), (radius + band / 2, 0, 0), (0, 0, 0), (1.1 * radius + band, 0, 0)])
+        assert mean == pytest.approx([0, band / 2, -band, band], abs=0.02)
+
+
 def test_height_field_does_not_change_with_height(stage, describe):
     bpy.ops.gpis.add(kind="HEIGHT_FIELD", radius=1.0, resolution=32)
     (entry,), _ = describe()

@@ -111,6 +111,19 @@ def test_ellipses_appear_where_it_is_combed(module, sphere):
     np.testing.assert_allclose(hand.look.ellipses, hand.whole().ellipses, rtol=0, atol=1e-12)
 
 
+def test_ellipses_are_spread_evenly(module, stage):
+    """None upon another one, and no bare places."""
+    bpy.ops.gpis.add(kind="SPHERE", radius=2.0, resolution=96)
+    surface, channels = module("viewport.surface").of(bpy.context.object), module("viewport.channels")
+    places = surface.vertices[channels.some_vertices(surface)]
+    assert 1000 < len(places) < 1800
+    square = np.sqrt(4 * np.pi * 2.0**2 / len(places))
+    apart = np.linalg.norm(places[:, None] - places, axis=2)
+    assert np.min(apart + 10 * np.eye(len(places))) > 0.25 * square
+    bare = np.linalg.norm(surface.vertices[::7, None] - places, axis=2).min(axis=1)
+    assert bare.max() < 1.1 * square
+
+
 def test_a_move_beside_the_surface_asks_nothing(module, sphere):
     brush = bpy.context.scene.gpis.paint
     brush.channel = "DEVIATION"
@@ -202,6 +215,16 @@ def test_shells_stand_off_by_the_deviation(module, sphere):
     for side, shell in zip((1, -1), hand.look.shells, strict=True):
         way = np.sum((shell - hand.surface.vertices) * hand.surface.normals, axis=1)
         np.testing.assert_allclose(way, side * deviation, atol=1e-12)
+
+
+def test_a_legend_gets_room_beyond_what_leaves_it(module):
+    widened = module("viewport.colour").widened
+    low, high = module("viewport.colour").log_range(np.array([0.3, 0.33]))
+    assert high == pytest.approx(2 * low) and low < 0.3 and high > 0.33, "noise of equal values is not all colours"
+    assert widened((1.0, 4.0), np.array([0.995, 2.0, 4.03])) == (1.0, 4.0), "as good as on it"
+    assert widened((1.0, 4.0), np.array([0.8, 2.0])) == (0.4, 4.0)
+    assert widened((1.0, 4.0), np.array([2.0, 6.0])) == (1.0, 12.0)
+    assert widened((1.0, 4.0), np.array([0.0, np.inf])) == (1.0, 4.0) and widened((1.0, 4.0), np.array([])) == (1.0, 4.0)
 
 
 def test_a_value_off_the_legend_makes_a_new_one(module, sphere, drawn):

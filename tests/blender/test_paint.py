@@ -326,6 +326,11 @@ def test_a_pinned_point_is_exact_unless_others_are_near(painted_sphere, describe
     mean, variance = entry["process"].posterior([(1, 0, 0), (0, 0, 1), (0, 1, 0)])
     np.testing.assert_allclose(mean[:2], 0, atol=1e-6)
     np.testing.assert_allclose(variance, [0, 0, 0.01], atol=1e-6)
+    # Of bumps that are longer in one direction, the longest length counts.
+    bpy.ops.gpis.erase_conditions()
+    painted_sphere.gpis.anisotropy, painted_sphere.gpis.ratios = "AXES", (1, 3, 1)
+    paint("CONDITION", "PIN", [(1, 0, 0), (np.cos(0.7), 0, np.sin(0.7)), (-1, 0, 0)])
+    assert [point.noise for point in painted_sphere.gpis.conditions] == pytest.approx([0, 0.002, 0])
 
 
 def test_condition_points_are_rendered(stage, painted_sphere, tmp_path):

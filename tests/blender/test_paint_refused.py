@@ -83,6 +83,22 @@ def test_a_radius_beyond_all_paints_all(painted_sphere, gn):
     np.testing.assert_allclose(grids_of(gn, painted_sphere)["sigma"], 0.2, rtol=1e-6)
 
 
+def test_strokes_along_the_ends_do_not_extend_the_grid_for_ever(painted_sphere, bake):
+    """However large the brush: a dab at c asks for a quarter of the side 2 h beyond it, of which the limit is h = 2 c, and
+    the grid grows by whole leaves of 8 voxels."""
+    before = np.ptp(bake.fields(painted_sphere).bounds(), axis=0)
+    leaf, furthest = 8 * max(bake.fields(painted_sphere).voxel_size()), 1.4
+    for seed in range(4):
+        paint("DEVIATION", "SET", furthest * arc(seed, 6), value=0.2, radius=50.0, symmetry=(True, True, True))
+    low, high = np.array(bake.fields(painted_sphere).bounds())
+    assert np.all(high - low > before) and max(-low.min(), high.max()) < 2 * (furthest + leaf) + leaf
+    # A small brush asks for no more than itself.
+    paint("DEVIATION", "SET", [(high[0], 0, 0)], value=0.2, radius=0.1)
+    wider_low, wider_high = np.array(bake.fields(painted_sphere).bounds())
+    assert wider_high[0] > high[0] and np.all(wider_high - high < 0.1 + leaf)
+    assert np.all(wider_low == low) and np.all(wider_high[1:] == high[1:])
+
+
 @pytest.mark.parametrize(
     ("path", "sentence"), [("", 'Volume "Sphere GPIS" has no file: choose'), ("/nowhere/x.vdb", "is not there|is not a file|no file")]
 )
