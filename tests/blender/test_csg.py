@@ -284,25 +284,90 @@ def test_compare(operands):
     assert bpy.ops.gpis.csg_compare(samples=32, width=32) == {"FINISHED"}
     assert [obj.hide_render for obj in bpy.data.objects] == hidden
     image = bpy.data.images["A Fit: Live, Fitted, Difference"]
-    pixels = np.empty(image.size[0] * image.size[1] * 4, dtype=np.float32)
-    image.pixels.foreach_get(pixels)
-    pixels = pixels.reshape(image.size[1], image.size[0], 4)[..., :3]
-    assert image.size[0] == 96 and image.size[1] == 24 and image.packed_file is not None
-    live, fit, difference = np.split(pixels, 3, axis=1)
+    assert image == fitted.gpis_csg.comparison_image and image.packed_file is not None
+
+    def pictures():
+        """Rows of three pictures, the top row first."""
+        width, height = image.size
+        assert (width, height) == (96, 72)
+        image.pixels.foreach_get(pixels := np.empty(width * height * 4, dtype=np.float32))
+        rows = np.split(pixels.reshape(height, width, 4)[..., :3], 3)[::-1]
+        return [np.split(row, 3, axis=1) for row in rows]
+
+    (live, fit, difference), errors, shape = pictures()
     text = fitted.gpis_csg.comparison
-    gain = float(text.split("difference times ")[1].rstrip("."))
+    gain = float(text.split("difference times ")[1].split(".")[0])
     np.testing.assert_allclose(difference, gain * np.abs(live - fit), atol=1e-4 * gain)
     assert "Live " in text and " s at 32 samples. Pixels differ by " in text
+    # Below: black beside the surface, colours on it; those of the shape are not one colour, for there are creases.
+    for name, picture in zip(text.split("yellow: ")[1].split("; "), [*errors, *shape], strict=True):
+        covered = np.sum(picture, axis=-1) > 0.3
+        assert 0.05 < covered.mean() < 0.9, name
+        assert picture[covered].std(axis=0).max() > 0.02, name
     # The list, not twice the same: and the fit is near it, where the first operand alone is not.
     assert 0 < np.abs(live - fit).mean() < 0.02
     a.gpis_csg.items[0].enabled = a.gpis_csg.items[1].enabled = False
     assert bpy.ops.gpis.csg_compare(samples=32, width=32) == {"FINISHED"}
-    image.pixels.foreach_get(again := np.empty(pixels.size // 3 * 4, dtype=np.float32))
-    alone = np.split(again.reshape(24, 96, 4)[..., :3], 3, axis=1)[0]
+    assert image == fitted.gpis_csg.comparison_image
+    alone = pictures()[0][0]
     off = [float(np.abs(other - fit).mean()) for other in (alone, live)]
     assert off[0] > 2 * off[1]
     bpy.data.objects.remove(a)
     assert not bpy.ops.gpis.csg_compare.poll()
+
+
+def test_comparison_of_a_long_name(operands):
+    """Blender cuts names to 63 bytes (255 from 5.0 on): the image is found again, and not another fit's."""
+    a, b, c = operands
+    build(a, ["UNION", "UNION"])
+    images = []
+    for _ in range(2):
+        bpy.context.view_layer.objects.active = a
+        assert bpy.ops.gpis.csg_fit(resolution=8, method="CLOSED_FORM") == {"FINISHED"}
+        fitted = bpy.context.object
+        fitted.name = "ß" * 31
+        for _ in range(2):
+            assert bpy.ops.gpis.csg_compare(samples=1, width=8) == {"FINISHED"}
+        images.append(fitted.gpis_csg.comparison_image)
+    assert images[0] != images[1] and len(bpy.data.images) == 2
+
+
+def test_menu(stage, extension):
+    """What the search of the menus (F3) finds: it looks through what the Object menu draws."""
+    drawn = [function.__module__ for function in bpy.types.VIEW3D_MT_object._dyn_ui_initialize()]
+    assert extension + ".csg.menu" in drawn
+
+
+def test_linked_operands(stage, describe, tmp_path):
+    """An operand out of another file is what it would be in this one; a list out of another file is not changed here."""
+    a, b = add_gpis(stage, "A", (0, 0, 0), 1.0), add_gpis(stage, "B", (0.9, 0, 0), 0.6)
+    for obj in (a, b):
+        obj.gpis_csg.items.clear()
+    a.gpis_csg.items.add().object = b
+    (local,), _ = describe()
+    library = str(tmp_path / "library.blend")
+    bpy.data.libraries.write(library, {a, b})
+    bpy.data.objects.remove(b)
+    a.gpis_csg.items.clear()
+    with bpy.data.libraries.load(library, link=True) as (_, linked):
+        linked.objects = ["B"]
+    (b,) = linked.objects
+    stage.collection.objects.link(b)
+    a.select_set(True)
+    b.select_set(True)
+    bpy.context.view_layer.objects.active = a
+    bpy.context.view_layer.update()
+    assert bpy.ops.gpis.csg_add(operation="UNION") == {"FINISHED"}
+    assert a.gpis_csg.items[0].object == b and b.library is not None
+    (entry,), warnings = describe()
+    assert repr(entry["process"]) == repr(local["process"]) and warnings == []
+    points = np.random.default_rng(1).uniform(-0.5, 1, (20, 3))
+    for one, other in zip(entry["process"].leaves, local["process"].leaves, strict=True):
+        np.testing.assert_array_equal(one.mean(points), other.mean(points))
+    assert bpy.ops.gpis.csg_fit(resolution=8, method="CLOSED_FORM") == {"FINISHED"}
+    assert bpy.ops.gpis.csg_compare(samples=1, width=8) == {"FINISHED"}
+    bpy.context.view_layer.objects.active = b
+    assert not bpy.ops.gpis.csg_add.poll() and not bpy.ops.gpis.csg_drag.poll()
 
 
 def test_progress_and_cancelling(operands, extension):
