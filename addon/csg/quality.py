@@ -13,6 +13,8 @@ _SHAPE = ("skewness", "kolmogorov")
 _NEAR = 3.0
 # Of the values on a scale of colours; a few extremes would leave all others one colour.
 _MOST = 99.0
+# Images are linear, the colour map is not.
+_DISPLAY = 2.2
 
 
 def near(fit):
@@ -107,12 +109,12 @@ def seen(description, entry, fit, size, samples, progress):
     gn, out = native(), []
     for k in range(0, len(parts), 2):
         grids = [gn.GridField(one.astype(float), fit["voxel_size"], fit["origin"]) for one in parts[k : k + 2]]
-        shown = entry | {"albedo": gn.ColorField(*grids, 1.0), "materials": ["White"] * len(entry["materials"])}
+        body = entry | {"albedo": gn.ColorField(*grids, 1.0), "materials": ["White"] * len(entry["materials"])}
         scene = description | {
             "settings": description["settings"] | {"max_bounces": 0},
             "materials": {"White": {"type": "lambert", "color": (1.0, 1.0, 1.0)}},
             "meshes": {},
-            "objects": [shown],
+            "objects": [body],
         }
         # The same seed: the same hits.
         result = gn.render(
@@ -127,5 +129,6 @@ def seen(description, entry, fit, size, samples, progress):
         cover = albedo[..., 2]
         for channel in range(2):
             values = albedo[..., channel] / np.maximum(cover, 1e-6)
-            out.append(colour.of(values.reshape(-1)).reshape(*values.shape, 3) * cover[..., None])
+            shown = colour.of(values.reshape(-1)).reshape(*values.shape, 3)
+            out.append(shown**_DISPLAY * cover[..., None])
     return out
