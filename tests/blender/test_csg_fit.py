@@ -98,6 +98,7 @@ def test_compare(operands):
         covered = np.sum(picture, axis=-1) > 0.1
         assert 0.05 < covered.mean() < 0.9, name
         assert picture[covered].std(axis=0).max() > 0.02, name
+    assert len({picture.tobytes() for picture in [*errors, *shape]}) == 6
     # The list, not twice the same: and the fit is near it, where the first operand alone is not.
     assert 0 < np.abs(live - fit).mean() < 0.02
     a.gpis_csg.items[0].enabled = a.gpis_csg.items[1].enabled = False
