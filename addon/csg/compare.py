@@ -1,4 +1,5 @@
-"""A picture of how good a fit is: the list live, its fit and their difference, at equal samples, with the time each took."""
+"""A picture of how good a fit is: the list live, its fit and their difference, at equal samples, with the time each took; and
+the numbers that the fit states itself, as colours of its surface."""
 
 import math
 import time
@@ -7,14 +8,17 @@ import bpy
 import numpy as np
 from bpy.props import IntProperty
 
-from .. import sync
+from .. import sync, volume
 from ..native import native
 from ..sync import camera, gpis
-from .work import Working
+from . import quality
+from .work import Asking, Working
 
 _LUMINANCE = (0.2126, 0.7152, 0.0722)
 # Samples of a block, of which there must be several to tell the noise.
 _BLOCK = 16
+# Samples that are enough for colours of a surface, and the part of the progress that they take.
+_SEEN_SAMPLES, _SEEN_PART = 16, 0.1
 
 
 class Comparison:
@@ -25,6 +29,7 @@ class Comparison:
         frame = camera.frame_size(context.scene)
         self.size = width, max(1, round(width * frame[1] / frame[0]))
         self.samples, self.seed = samples, seed
+        self.fit = native().read_vdb(volume.path_of(fitted.data))
         self._states = []
         for obj in (fitted.gpis_csg.fitted_from, fitted):
             # As a viewport's frame: its depsgraph also holds what is not rendered, the operands.
@@ -37,7 +42,7 @@ class Comparison:
             self._states.append(state)
 
     def run(self, progress):
-        """(live, fitted), each (result, seconds), or None where it was cancelled."""
+        """(live, fitted, colours): twice (result, seconds), and what quality.seen gives; None where it was cancelled."""
         out = []
         for k, state in enumerate(self._states):
             try:
@@ -48,26 +53,39 @@ class Comparison:
                     *self.size,
                     samples=self.samples,
                     seed=self.seed + k,  # noise of its own
-                    progress=lambda fraction, stats, k=k: progress((k + fraction) / 2),
+                    progress=lambda fraction, stats, k=k: progress((1 - _SEEN_PART) * (k + fraction) / 2),
                 )
             except ValueError as error:
                 raise ValueError(sync.explain(state, str(error))) from error
             if result.stats["cancelled"]:
                 return None
             out.append((result, time.monotonic() - began))
-        return out
+        description = self._states[1].description
+        colours = quality.seen(
+            description,
+            description["objects"][-1],
+            self.fit,
+            self.size,
+            _SEEN_SAMPLES,
+            lambda fraction: progress(1 - _SEEN_PART + _SEEN_PART * fraction),
+        )
+        return None if colours is None else (*out, colours)
 
 
-def pixels_of(live, fitted):
-    """Three pictures side by side (H, 3 W, 4), row 0 at the bottom: live, fitted, and their difference times the gain."""
+def pixels_of(live, fitted, colours):
+    """Pictures side by side (rows H, 3 W, 4), row 0 at the bottom: live, fitted, and their difference times the gain; below
+    them the colours, three in a row."""
     a, b = (np.asarray(result.passes["combined"], dtype=np.float32) for result, _ in (live, fitted))
     difference = np.abs(a[..., :3] - b[..., :3])
     gain = 2.0 ** math.floor(math.log2(1 / max(np.percentile(difference, 99.5), 1e-4)))
-    third = np.concatenate([gain * difference, np.ones_like(a[..., :1])], axis=-1)
-    return np.concatenate([a, b, third], axis=1), gain
+    opaque = np.ones_like(a[..., :1])
+    third, *below = (np.concatenate([picture, opaque], axis=-1) for picture in (gain * difference, *colours))
+    rows = [np.concatenate([a, b, third], axis=1)]
+    rows += [np.concatenate(below[k : k + 3], axis=1) for k in range(0, len(below), 3)]
+    return np.concatenate(rows[::-1]), gain
 
 
-def sentence(live, fitted, samples, gain):
+def sentence(live, fitted, samples, gain, titles):
     a, b = (np.asarray(result.passes["combined"], dtype=float)[..., :3] @ _LUMINANCE for result, _ in (live, fitted))
     noise = sum(np.asarray(result.passes["variance"], dtype=float) @ _LUMINANCE for result, _ in (live, fitted))
     text = f"Live {live[1]:.2g} s, fitted {fitted[1]:.2g} s at {samples} samples. "
@@ -78,18 +96,22 @@ def sentence(live, fitted, samples, gain):
             f"Pixels differ by {rms:.2g} (noise alone: {expected:.2g}), the whole picture by {off:+.2g} "
             f"± {np.sqrt(noise.sum()) / noise.size:.1g}. "
         )
-    return text + f"From left to right: live, fitted, difference times {gain:g}."
+    text += f"From left to right: live, fitted, difference times {gain:g}."
+    if titles:
+        text += f" Below, of the fit where it is seen, violet to yellow: {'; '.join(titles)}."
+    return text
 
 
-def image_of(name, pixels):
-    """An image datablock of that name, made or written over."""
+def write_image(settings, name, pixels):
+    """The image of these settings, made (with about that name) or written over."""
     height, width = pixels.shape[:2]
-    image = bpy.data.images.get(name)
+    image = settings.comparison_image
     if image is not None and tuple(image.size) != (width, height):
         bpy.data.images.remove(image)
         image = None
     if image is None:
         image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=True)
+        settings.comparison_image = image
     image.use_view_as_render = True
     image.pixels.foreach_set(np.ascontiguousarray(pixels, dtype=np.float32).reshape(-1))
     image.update()
@@ -106,18 +128,11 @@ def show(context, image):
                 return
 
 
-class GPIS_OT_csg_compare(Working, bpy.types.Operator):
-    """Render the CSG list that this was fitted to, and the fit, at equal samples: an image of both and their difference,
-    with the time each took"""
-
-    bl_idname = "gpis.csg_compare"
-    bl_label = "Compare with the List"
-    bl_options = {"UNDO"}
-    doing = "Rendering the list and its fit"
-    cancelled = "The comparison was cancelled."
+class _Compare:
+    """Properties that the dialog and the work share."""
 
     samples: IntProperty(name="Samples", description="Of both pictures, for each pixel", default=64, min=1, soft_max=4096)
-    width: IntProperty(name="Width", description="Pixels of each of the three pictures", default=320, min=8, soft_max=1920)
+    width: IntProperty(name="Width", description="Pixels of each of the pictures", default=320, min=8, soft_max=1920)
     seed: IntProperty(name="Seed", description="Another seed gives other noise", default=0, min=0)
 
     @classmethod
@@ -128,21 +143,50 @@ class GPIS_OT_csg_compare(Working, bpy.types.Operator):
             return False
         return True
 
+
+class GPIS_OT_csg_compare(_Compare, Asking, bpy.types.Operator):
+    """Render the CSG list that this was fitted to, and the fit, at equal samples: an image of both and their difference,
+    with the time each took, and of the errors, shape and length scales of the fit where it is seen"""
+
+    bl_idname = "gpis.csg_compare"
+    bl_label = "Compare with the List"
+    bl_options = set()
+    runs, handed = "csg_compare_run", ("samples", "width", "seed")
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        for name in self.handed:
+            layout.prop(self, name)
+
+
+class GPIS_OT_csg_compare_run(_Compare, Working, bpy.types.Operator):
+    """Render the list and its fit"""
+
+    bl_idname = "gpis.csg_compare_run"
+    bl_label = "Compare with the List"
+    bl_options = {"INTERNAL", "UNDO"}
+    doing = "Rendering the list and its fit"
+    cancelled = "The comparison was cancelled."
+
     def prepare(self, context):
         self._fitted = context.object
-        return Comparison(context, self._fitted, width=self.width, samples=self.samples, seed=self.seed).run
+        self._comparison = Comparison(context, self._fitted, width=self.width, samples=self.samples, seed=self.seed)
+        return self._comparison.run
 
     def finish(self, context, result):
-        pixels, gain = pixels_of(*result)
+        *both, colours = result
+        pixels, gain = pixels_of(*both, colours)
         settings = self._fitted.gpis_csg
-        settings.comparison = sentence(*result, self.samples, gain)
-        image = image_of(f"{self._fitted.name}: Live, Fitted, Difference", pixels)
+        titles = [quantity.title for quantity in quality.quantities(self._comparison.fit)]
+        settings.comparison = sentence(*both, self.samples, gain, titles)
+        image = write_image(settings, f"{self._fitted.name}: Live, Fitted, Difference", pixels)
         show(context, image)
         self.report({"INFO"}, f'Image "{image.name}". {settings.comparison}')
         return {"FINISHED"}
 
 
-_CLASSES = (GPIS_OT_csg_compare,)
+_CLASSES = (GPIS_OT_csg_compare, GPIS_OT_csg_compare_run)
 
 
 register, unregister = bpy.utils.register_classes_factory(_CLASSES)

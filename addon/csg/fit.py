@@ -1,13 +1,13 @@
 """Sample & Compose → Fit: one GPIS with the moments of an object and its operands, as a new Volume."""
 
 import bpy
-import numpy as np
 from bpy.props import EnumProperty, IntProperty
 
 from ..bake import files
 from ..native import native
 from ..sync import Sync, gpis
-from .work import Working
+from .quality import summary
+from .work import Asking, Working
 
 METHODS = (
     ("SAMPLE", "Sample", "Draw realisations of all operands together, compose each of them, and sum up", 0),
@@ -18,10 +18,6 @@ METHODS = (
         1,
     ),
 )
-
-# Of a node to count in the summary: where the surface may be.
-_NEAR = 3.0
-
 
 class _Query:
     """What compose_and_fit takes, from an object with its list."""
@@ -41,47 +37,6 @@ class _Query:
         return native().compose_and_fit(*self.arguments, seed, method=self.method, progress=progress)
 
 
-def summary(fit, realisations, method):
-    """Sentences about how well the fit says what was composed."""
-    near = np.abs(fit["mean"]) < _NEAR * np.maximum(fit["sigma"], fit["voxel_size"])
-    counters = fit["counters"]
-    drawn = fit["kolmogorov"] > 0
-    lines = [
-        f"{counters['voxels']:,} voxels of {fit['voxel_size']:.3g}, {counters['voxels_drawn']:,} sampled"
-        f" ({counters['voxels_drawn'] / counters['voxels']:.0%}), {counters['seconds']:.1f} s."
-    ]
-    if method == "SAMPLE" and counters["voxels_drawn"]:
-        sampled = fit["mean_error"] > 0
-        lines.append(
-            f"{realisations:,} realisations: standard error of the mean up to {fit['mean_error'].max():.2g}, of σ up to "
-            f"{fit['sigma_error'].max():.2g} (σ there {np.median(fit['sigma'][sampled]):.2g})."
-        )
-    if np.any(drawn & near):
-        where = drawn & near
-        lines.append(
-            f"Near the surface {np.mean(drawn[near]):.0%} of the voxels mix operands: Kolmogorov distance to a normal distribution "
-            f"{np.median(fit['kolmogorov'][where]):.2g}, at most {fit['kolmogorov'][where].max():.2g}; skewness "
-            f"{fit['skewness'][where].min():.2g} to {fit['skewness'][where].max():.2g}."
-        )
-    else:
-        lines.append("Near the surface one operand wins everywhere: mean and σ are exact.")
-    lengths = np.sqrt(np.linalg.eigvalsh(_matrices(fit["anisotropy"][near])))
-    if len(lengths):
-        lines.append(f"Length scales {lengths.min():.2g} to {lengths.max():.2g}.")
-        if lengths.min() < 1.001 * fit["voxel_size"]:
-            lines.append("The shortest are those of a voxel: a higher resolution keeps shorter ones.")
-    if counters["length_scales_limited"]:
-        lines.append(f"At {counters['length_scales_limited']:,} voxels they were brought into one voxel to 4 diagonals.")
-    return " ".join(lines)
-
-
-def _matrices(entries):
-    out = np.empty((len(entries), 3, 3))
-    for k, (i, j) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))):
-        out[:, i, j] = out[:, j, i] = entries[:, k]
-    return out
-
-
 def make_volume(context, obj, fit, sentence):
     """The fit as a new GPIS object in place of `obj`, which is no longer rendered itself."""
     path = files.new_path(f"{obj.name} Fit")
@@ -92,7 +47,9 @@ def make_volume(context, obj, fit, sentence):
     material = obj.material_slots[0].material if obj.material_slots else None
     data.materials.append(material)
     fitted = bpy.data.objects.new(f"{obj.name} Fit", data)
-    for collection in obj.users_collection:
+    # What is linked from another file cannot be added to.
+    own = [collection for collection in obj.users_collection if collection.library is None]
+    for collection in own or [context.collection]:
         collection.objects.link(fitted)
     fitted.matrix_world = obj.matrix_world
     settings = fitted.gpis
@@ -143,16 +100,17 @@ class _Fit:
         return _Query(context, context.object, resolution=self.resolution, realisations=self.realisations, method=self.method)
 
 
-class GPIS_OT_csg_fit(_Fit, bpy.types.Operator):
+class GPIS_OT_csg_fit(_Fit, Asking, bpy.types.Operator):
     """Fit one GPIS (mean, σ and length scales that vary) to the object and its operands, as a new Volume"""
 
     bl_idname = "gpis.csg_fit"
     bl_label = "Sample & Compose → Fit"
-    bl_options = {"REGISTER"}
+    bl_options = set()
+    runs, handed = "csg_fit_run", ("resolution", "realisations", "seed", "method")
 
     def invoke(self, context, event):
         self._planned = None
-        return context.window_manager.invoke_props_dialog(self, width=360)
+        return super().invoke(context, event)
 
     def draw(self, context):
         layout = self.layout
@@ -184,15 +142,6 @@ class GPIS_OT_csg_fit(_Fit, bpy.types.Operator):
             self._planned = (key, lines)
         return self._planned[1]
 
-    def execute(self, context):
-        how = "EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT"
-        values = {name: getattr(self, name) for name in ("resolution", "realisations", "seed", "method")}
-        try:
-            return bpy.ops.gpis.csg_fit_run(how, **values)
-        except RuntimeError as error:  # what the other operator has reported, which Blender raises here
-            self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
-            return {"CANCELLED"}
-
 
 class GPIS_OT_csg_fit_run(_Fit, Working, bpy.types.Operator):
     """Fit one GPIS to the object and its operands; Esc cancels"""
@@ -214,6 +163,8 @@ class GPIS_OT_csg_fit_run(_Fit, Working, bpy.types.Operator):
         first, *others = self._query.materials
         if any(other != first for other in others):
             sentence += f' All of it has the material of "{obj.name}"; those of other operands are not kept.'
+        if obj.library is not None:
+            sentence += f' "{obj.name}" is linked: hide it by yourself, for that is not kept in this file.'
         fitted = make_volume(context, obj, result, sentence)
         self.report({"INFO"}, f'"{fitted.name}" is fitted; "{obj.name}" is no longer rendered itself. {sentence}')
         return {"FINISHED"}

@@ -34,6 +34,9 @@ class _ListOperator:
         if obj is None or obj.type != "VOLUME" or not obj.gpis.enabled:
             cls.poll_message_set("Make a GPIS the active object first")
             return False
+        if obj.library is not None:
+            cls.poll_message_set("The active object is linked from another file: make it local first")
+            return False
         return True
 
 
@@ -44,7 +47,7 @@ class GPIS_OT_csg_add(_ListOperator, bpy.types.Operator):
     bl_idname = "gpis.csg_add"
     bl_label = "Add Operands"
 
-    operation: EnumProperty(name="Operation", items=OPERATIONS, default="UNION")
+    operation: EnumProperty(name="Operation", items=OPERATIONS, default="UNION", options={"SKIP_SAVE"})
 
     def execute(self, context):
         obj = context.object

@@ -69,6 +69,11 @@ class GPIS_CSGProperties(bpy.types.PropertyGroup):
     quality: StringProperty(name="Fit", description="How well the fit says what was composed")
     fitted_from: PointerProperty(name="Fitted From", description="The GPIS to whose list this was fitted", type=bpy.types.Object)
     comparison: StringProperty(name="Comparison", description="What a render of the list and one of the fit have shown")
+    comparison_image: PointerProperty(
+        name="Comparison Image",
+        description="The list, its fit and their difference, and below them how good the fit is where it is seen",
+        type=bpy.types.Image,
+    )
 
 
 _CLASSES = (GPIS_CSGItem, GPIS_CSGProperties)

@@ -1,6 +1,8 @@
-"""Work of the native module in a thread of its own, and operators that wait for it: a bar, and Esc."""
+"""Work of the native module in a thread of its own, operators that wait for it (a bar, and Esc), and their dialogs."""
 
 import threading
+
+import bpy
 
 
 class Work:
@@ -93,3 +95,23 @@ class Working:
             self.report({"INFO"}, self.cancelled)
             return {"CANCELLED"}
         return self.finish(context, self._work.result)
+
+
+class Asking:
+    """An operator with a dialog, whose properties `handed` the operator `runs` (of bpy.ops.gpis) works with."""
+
+    runs = ""
+    handed = ()
+
+    def invoke(self, context, event):
+        return context.window_manager.invoke_props_dialog(self, width=360)
+
+    def execute(self, context):
+        how = "EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT"
+        try:
+            result = getattr(bpy.ops.gpis, self.runs)(how, **{name: getattr(self, name) for name in self.handed})
+        except RuntimeError as error:  # what the other operator has reported, which Blender raises here
+            self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
+            return {"CANCELLED"}
+        # This one is done; the other goes on by itself.
+        return {"FINISHED"} if "RUNNING_MODAL" in result else result

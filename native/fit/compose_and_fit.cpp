@@ -23,6 +23,9 @@ constexpr auto kProgressInterval = std::chrono::milliseconds(100);
 // Of the bricks of normals that one realisation of one source keeps (process/lattice_noise.h).
 constexpr double kNoiseMemory = 4e6;
 
+// Tiles that an estimate of the time is made from; fewer where a tile is worked on as it will be.
+constexpr int kTimedTiles = 4, kTimedClosed = 2;
+
 // Of computing, not of waiting for other programs.
 double thread_seconds() {
   timespec now;
@@ -59,24 +62,8 @@ class Fitter {
     for (const std::size_t n : sampled) plan.voxels_drawn += n;
     plan.seconds = 3 * counting;
     const double threads = arena_.max_concurrency();
-    if (plan.voxels_drawn > 0) {
-      const auto fullest = std::max_element(sampled.begin(), sampled.end());
-      const int tile = static_cast<int>(fullest - sampled.begin());
-      Fit scratch = empty_fit();
-      TileWorker worker(composition_, query_, nodes_);
-      const auto time = [&](int realisations) {
-        const double begin = thread_seconds();
-        worker.work(tile, realisations, cancelled_, scratch);
-        return thread_seconds() - begin;
-      };
-      time(2);  // opens what is opened once
-      const double few = time(2), more = query_.closed_form ? few : time(10);
-      const double realisation = std::max(more - few, 0.0) / 8;
-      const double tile_seconds =
-          std::max(few - 2 * realisation, 0.0) + realisation * query_.realisations;
-      plan.seconds += tile_seconds / static_cast<double>(*fullest) *
-                      static_cast<double>(plan.voxels_drawn) / threads;
-    }
+    if (plan.voxels_drawn > 0)
+      plan.seconds += seconds_per_node(sampled) * static_cast<double>(plan.voxels_drawn) / threads;
     const double leaves = composition_.leaves(), sources = composition_.sources();
     const double tile = double(TileWorker::kSize[0]) * TileWorker::kSize[1] * TileWorker::kSize[2];
     // Six scalar grids, G, and A of this round and the last.
@@ -119,6 +106,47 @@ class Fitter {
   }
 
  private:
+  // Seconds of one thread for a sampled node: the mean of some tiles, each as likely to be among
+  // them as it holds sampled nodes, so that it is that of all nodes. Tiles that are partly sampled
+  // are dearer, for realisations fill the box around their nodes. Timed by all threads at once, as
+  // they will work: two threads of one core take longer than one.
+  double seconds_per_node(const std::vector<std::size_t>& sampled) {
+    const int draws = query_.closed_form ? kTimedClosed : kTimedTiles;
+    std::size_t total = 0, passed = 0;
+    for (const std::size_t n : sampled) total += n;
+    std::vector<std::pair<int, int>> timed;  // tile, how often
+    int next = 0;
+    for (std::size_t tile = 0; tile < sampled.size(); ++tile) {
+      passed += sampled[tile];
+      int often = 0;
+      for (; next < draws && (next + 0.5) / draws * total < passed; ++next) ++often;
+      if (often > 0) timed.emplace_back(static_cast<int>(tile), often);
+    }
+    Fit scratch = empty_fit();
+    std::vector<double> seconds(timed.size());
+    each(static_cast<int>(timed.size()), [&](int i) {
+      const int tile = timed[i].first;
+      TileWorker& worker = workers_.local();
+      const auto time = [&](int realisations) {
+        const double begin = thread_seconds();
+        worker.work(tile, realisations, cancelled_, scratch);
+        return thread_seconds() - begin;
+      };
+      if (query_.closed_form) {
+        seconds[i] = time(2) / static_cast<double>(sampled[tile]);
+        return;
+      }
+      time(2);  // opens what is opened once
+      const double few = time(2), more = time(10);
+      const double realisation = std::max(more - few, 0.0) / 8;
+      const double once = std::max(few - 2 * realisation, 0.0);
+      seconds[i] = (once + realisation * query_.realisations) / static_cast<double>(sampled[tile]);
+    });
+    double mean = 0;
+    for (std::size_t i = 0; i < timed.size(); ++i) mean += timed[i].second * seconds[i] / draws;
+    return mean;
+  }
+
   // A node that is not sampled costs about as much as one realisation of one that is.
   double cost(std::size_t sampled) const {
     return 8192 + static_cast<double>(sampled) * query_.realisations;

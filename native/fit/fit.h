@@ -42,7 +42,7 @@ struct Fit {
 struct FitPlan {
   NodeGrid nodes;
   std::size_t voxels_drawn = 0;
-  double seconds = 0;  // estimated from one tile
+  double seconds = 0;  // estimated from some tiles
   double memory = 0;   // bytes, grids and working space at their most
 };
 

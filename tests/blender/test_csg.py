@@ -1,4 +1,4 @@
-"""CSG lists of GPIS objects: what they are in the description, how they are edited, and the fit."""
+"""CSG lists of GPIS objects: what they are in the description, and how they are edited."""
 
 import importlib
 
@@ -8,48 +8,12 @@ import pytest
 from mathutils import Matrix
 
 from . import support
-
-
-def add_gpis(scene, name, location, radius, color=(0.8, 0.8, 0.8), sigma=0.05, **placed):
-    """A GPIS of a sphere, without a mesh: a small grid of its distance."""
-    gn = importlib.import_module("gpis_native")
-    n, side = 25, 1.6 * radius
-    x = np.linspace(-side, side, n)
-    distance = np.sqrt(x[:, None, None] ** 2 + x[:, None] ** 2 + x**2) - radius
-    path = f"{bpy.app.tempdir}/{name}.vdb"
-    gn.write_vdb(path, {"mean": distance, "origin": (-side,) * 3, "voxel_size": x[1] - x[0]})
-    data = bpy.data.volumes.new(name)
-    data.filepath = path
-    data.materials.append(support.diffuse(f"{name} Material", color))
-    obj = support.link(scene, name, data, location=location, **placed)
-    obj.gpis.enabled = True
-    obj.gpis.sigma, obj.gpis.length_scale = sigma, 0.4
-    return obj
+from .csg_objects import add_gpis, build, entry_of, make_operands
 
 
 @pytest.fixture
 def operands(stage):
-    """A base of radius 1 and two smaller ones, b turned and stretched; the base is active, all are selected."""
-    a = add_gpis(stage, "A", (0, 0, 0), 1.0, (1, 0, 0))
-    b = add_gpis(stage, "B", (0.9, 0, 0), 0.6, (0, 1, 0), rotation=(1, 0.2, 0.4, 0), scale=(1, 1.3, 0.7))
-    c = add_gpis(stage, "C", (0, -0.9, 0), 0.5, (0, 0, 1))
-    for obj in (a, b, c):
-        obj.select_set(True)
-    bpy.context.view_layer.objects.active = a
-    bpy.context.view_layer.update()
-    return a, b, c
-
-
-def build(a, operations):
-    assert bpy.ops.gpis.csg_add() == {"FINISHED"}
-    for item, operation in zip(a.gpis_csg.items, operations, strict=True):
-        item.operation = operation
-
-
-def entry_of(describe):
-    entries, warnings = describe()
-    (entry,) = (entry for entry in entries if not bpy.data.objects[entry["name"]].hide_render)
-    return entry, warnings
+    return make_operands(stage)
 
 
 def test_add_selected(operands, describe):
@@ -221,103 +185,42 @@ def test_sentences(operands, describe, change, sentence):
         describe()
 
 
-def test_fit(operands, describe, tmp_path):
-    """A new Volume with the moments of the composition, that renders like it."""
-    a, b, c = operands
-    for obj in operands:  # a fit has one material
-        obj.material_slots[0].material = a.material_slots[0].material
-    build(a, ["UNION", "UNION"])
-    live, _ = entry_of(describe)
-    bpy.context.scene.gpis.samples = 16
-    live_picture = support.picture(bpy.context.scene, tmp_path)
-    assert bpy.ops.gpis.csg_fit(resolution=24, realisations=200, seed=3) == {"FINISHED"}
-    fitted = bpy.context.object
-    assert fitted.name == "A Fit" and fitted.type == "VOLUME" and fitted.display_type == "BOUNDS"
-    assert a.hide_render and not fitted.hide_render
-    assert fitted.data.gpis_baked and fitted.material_slots[0].material == a.material_slots[0].material
-    assert "realisations: standard error of the mean" in fitted.gpis_csg.quality
-    assert "Kolmogorov distance" in fitted.gpis_csg.quality and "not kept" not in fitted.gpis_csg.quality
-    entry, warnings = entry_of(describe)
-    assert not warnings
-    points = np.random.default_rng(1).uniform(-1, 1, (50, 3))
-    values = np.stack([leaf.mean(points) for leaf in live["process"].leaves], axis=-1)
-    # Where one operand wins the mean is its own, between the voxels to their size.
-    other = np.sort(values, axis=1)
-    clear = other[:, 1] - other[:, 0] > 0.4
-    assert clear.sum() > 10
-    assert np.allclose(entry["process"].mean(points)[clear], other[clear, 0], atol=0.05)
-    picture = support.picture(bpy.context.scene, tmp_path, seed=1)
-    assert np.abs(live_picture - picture).mean() < 0.014  # 0.007 here, 0.024 for the first operand alone
-    assert np.allclose(live_picture.mean(axis=(0, 1)), picture.mean(axis=(0, 1)), atol=0.01)
+def test_menu(stage, extension):
+    """What the search of the menus (F3) finds: it looks through what the Object menu draws."""
+    drawn = [function.__module__ for function in bpy.types.VIEW3D_MT_object._dyn_ui_initialize()]
+    assert extension + ".csg.menu" in drawn
 
 
-def test_fit_of_a_smooth_union(operands):
-    """Both methods, to the same numbers."""
-    a, b, c = operands
-    build(a, ["SMOOTH_UNION", "UNION"])
-    a.gpis_csg.items[0].blend = 0.3
-    assert bpy.ops.gpis.csg_fit(resolution=16, method="CLOSED_FORM") == {"FINISHED"}
-    assert 'All of it has the material of "A"; those of other operands' in bpy.context.object.gpis_csg.quality
-    assert bpy.ops.gpis.csg_fit.poll() is False  # the fit has no list
-    closed = bpy.context.object
+def test_linked_operands(stage, describe, tmp_path):
+    """An operand out of another file is what it would be in this one; a list out of another file is not changed here."""
+    a, b = add_gpis(stage, "A", (0, 0, 0), 1.0), add_gpis(stage, "B", (0.9, 0, 0), 0.6)
+    for obj in (a, b):
+        obj.gpis_csg.items.clear()
+    a.gpis_csg.items.add().object = b
+    (local,), _ = describe()
+    library = str(tmp_path / "library.blend")
+    bpy.data.libraries.write(library, {a, b})
+    bpy.data.objects.remove(b)
+    a.gpis_csg.items.clear()
+    with bpy.data.libraries.load(library, link=True) as (_, linked):
+        linked.objects = ["B"]
+    (b,) = linked.objects
+    stage.collection.objects.link(b)
+    a.select_set(True)
+    b.select_set(True)
     bpy.context.view_layer.objects.active = a
-    assert bpy.ops.gpis.csg_fit(resolution=16, realisations=1000) == {"FINISHED"}
-    gn = importlib.import_module("gpis_native")
-    fits = [gn.read_vdb(bpy.path.abspath(obj.data.filepath)) for obj in (closed, bpy.context.object)]
-    drawn = fits[1]["mean_error"] > 1e-6
-    # The closed form of the third operand takes the first two for a Gaussian. Of another blend more than a quarter are off.
-    off = np.abs(fits[0]["mean"] - fits[1]["mean"])[drawn] > 5 * fits[1]["mean_error"][drawn]
-    assert drawn.mean() > 0.1 and off.mean() < 0.02
-
-
-def test_compare(operands):
-    """The fit beside the list it was made of: an image of both and of their difference, and a sentence."""
-    a, b, c = operands
-    for obj in operands:
-        obj.material_slots[0].material = a.material_slots[0].material
-    build(a, ["UNION", "UNION"])
-    assert not bpy.ops.gpis.csg_compare.poll()
-    assert bpy.ops.gpis.csg_fit(resolution=24, realisations=200, seed=3) == {"FINISHED"}
-    fitted = bpy.context.object
-    assert fitted.gpis_csg.fitted_from == a
-    hidden = [obj.hide_render for obj in bpy.data.objects]
-    assert bpy.ops.gpis.csg_compare(samples=32, width=32) == {"FINISHED"}
-    assert [obj.hide_render for obj in bpy.data.objects] == hidden
-    image = bpy.data.images["A Fit: Live, Fitted, Difference"]
-    pixels = np.empty(image.size[0] * image.size[1] * 4, dtype=np.float32)
-    image.pixels.foreach_get(pixels)
-    pixels = pixels.reshape(image.size[1], image.size[0], 4)[..., :3]
-    assert image.size[0] == 96 and image.size[1] == 24 and image.packed_file is not None
-    live, fit, difference = np.split(pixels, 3, axis=1)
-    text = fitted.gpis_csg.comparison
-    gain = float(text.split("difference times ")[1].rstrip("."))
-    np.testing.assert_allclose(difference, gain * np.abs(live - fit), atol=1e-4 * gain)
-    assert "Live " in text and " s at 32 samples. Pixels differ by " in text
-    # The list, not twice the same: and the fit is near it, where the first operand alone is not.
-    assert 0 < np.abs(live - fit).mean() < 0.02
-    a.gpis_csg.items[0].enabled = a.gpis_csg.items[1].enabled = False
-    assert bpy.ops.gpis.csg_compare(samples=32, width=32) == {"FINISHED"}
-    image.pixels.foreach_get(again := np.empty(pixels.size // 3 * 4, dtype=np.float32))
-    alone = np.split(again.reshape(24, 96, 4)[..., :3], 3, axis=1)[0]
-    off = [float(np.abs(other - fit).mean()) for other in (alone, live)]
-    assert off[0] > 2 * off[1]
-    bpy.data.objects.remove(a)
-    assert not bpy.ops.gpis.csg_compare.poll()
-
-
-def test_progress_and_cancelling(operands, extension):
-    """The work that the window's modal operator watches: in a thread, told to stop."""
-    a, b, c = operands
-    build(a, ["UNION", "UNION"])
-    module = importlib.import_module(extension + ".csg.fit")
-    query = module._Query(bpy.context, a, resolution=96, realisations=1_000_000, method="SAMPLE")
-    plan = query.plan()
-    assert plan["seconds"] > 1 and 0 < plan["voxels_drawn"] < plan["voxels"] and plan["memory"] > 0
-    work = importlib.import_module(extension + ".csg.work").Work(lambda progress: query.run(1, progress))
-    assert work.running()
-    work.cancel()
-    work.join()
-    assert work.result is None and work.error is None and work.fraction < 1
+    bpy.context.view_layer.update()
+    assert bpy.ops.gpis.csg_add(operation="UNION") == {"FINISHED"}
+    assert a.gpis_csg.items[0].object == b and b.library is not None
+    (entry,), warnings = describe()
+    assert repr(entry["process"]) == repr(local["process"]) and warnings == []
+    points = np.random.default_rng(1).uniform(-0.5, 1, (20, 3))
+    for one, other in zip(entry["process"].leaves, local["process"].leaves, strict=True):
+        np.testing.assert_array_equal(one.mean(points), other.mean(points))
+    assert bpy.ops.gpis.csg_fit(resolution=8, method="CLOSED_FORM") == {"FINISHED"}
+    assert bpy.ops.gpis.csg_compare(samples=1, width=8) == {"FINISHED"}
+    bpy.context.view_layer.objects.active = b
+    assert not bpy.ops.gpis.csg_add.poll() and not bpy.ops.gpis.csg_drag.poll()
 
 
 def test_operands_of_an_instanced_collection(stage, operands, describe):

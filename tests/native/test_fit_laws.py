@@ -48,6 +48,27 @@ def same(x, y, sign=1):
         np.testing.assert_allclose(x[key], sign * y[key] if key == "mean" else y[key], rtol=2e-5, atol=2e-6, err_msg=key)
 
 
+def test_a_certain_operand_with_a_rare_one_before_it(seed):
+    """An atom with a thin tail is far from normal, and is said to be: skewness of -15, half the distribution off."""
+    level, m, s = 0.1, 0.1 + 2.5 * 0.2, 0.2
+    operands = [gn.GaussianProcess(level, 0.0, SE(1.0)), gn.GaussianProcess(m, s, SE(1.0))]
+    x = np.linspace(-9, 9, 200_001)
+    f, weight = np.minimum(level, m + s * x), phi(x) * (x[1] - x[0])
+    mean = np.sum(f * weight)
+    deviation, third = np.sqrt(np.sum((f - mean) ** 2 * weight)), np.sum((f - mean) ** 3 * weight)
+    skewness, distance = third / deviation**3, 1 - float(cdf((level - mean) / deviation))
+    assert skewness < -14 and 0.4 < distance < 0.5
+    exact = gn.compose_and_fit(operands, "union", BOX, 2, 2, method="closed_form", certainty=np.inf)
+    np.testing.assert_allclose(exact["sigma"], deviation, rtol=1e-5)
+    np.testing.assert_allclose(exact["skewness"], skewness, rtol=1e-4)
+    # Just below the atom, or on it.
+    below = abs(float(cdf((level - m) / s)) - (1 - distance))
+    np.testing.assert_allclose(exact["kolmogorov"], max(distance, below), atol=1e-3)
+    # Realisations are counted in steps of a fifth of the deviation: an atom inside of one is seen at its end.
+    drawn = gn.compose_and_fit(operands, "union", BOX, 2, 20_000, seed, certainty=np.inf)
+    assert np.all(np.abs(drawn["kolmogorov"] - exact["kolmogorov"]) < 0.2 * phi(0) + 0.02)
+
+
 @pytest.mark.parametrize("method", ["sample", "closed_form"])
 def test_algebra(method, seed):
     a, b, c = sphere(-0.2, 0.5, 0.1), sphere(0.3, 0.4, 0.15), sphere(0.0, 0.3, 0.2)
