@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "core/symmetric_eigen.h"
 #include "field/check.h"
 #include "process/conditions.h"
 
@@ -17,6 +18,13 @@ ConditionRows::ConditionRows(const GaussianProcess& process, const Covariance& c
     : metrics_(covariance.reach_metrics(kNegligible)) {
   if (!covariance.differentiable())
     refuse("Conditions take a differentiable kernel, not ", process.kernel->describe(), ".");
+  for (const Mat3& m : metrics_) {
+    const Mat3 square = transpose(m) * m;
+    const double least = eigenvalues_of({square.row[0].x, square.row[1].y, square.row[2].z,
+                                         square.row[0].y, square.row[0].z, square.row[1].z})[0];
+    // Of a metric that flattens an axis it is rounding.
+    least_stretch_ = std::min(least_stretch_, 0.999 * std::sqrt(std::max(0.0, least)));
+  }
   const auto& points = process.conditions->points;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Conditions::Point& p = points[i];
@@ -68,6 +76,13 @@ double ConditionRows::distance(const Vec3& x, const Vec3& y) const {
   double least = metrics_.empty() ? 0 : kInfinity;
   for (const Mat3& m : metrics_) least = std::min(least, length(m * (x - y)));
   return least;
+}
+
+double ConditionRows::distance_at_least(const Vec3& x, const Box3& box) const {
+  if (metrics_.empty()) return 0;
+  Vec3 away = x;
+  for (int k = 0; k < 3; ++k) away[k] -= std::clamp(x[k], box.min[k], box.max[k]);
+  return least_stretch_ * length(away);
 }
 
 // Each coordinate in turn: a convex problem of three variables, solved to its first digits, which

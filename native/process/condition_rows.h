@@ -35,6 +35,8 @@ class ConditionRows {
   double distance(const Vec3& x, const Vec3& y) const;
   // From a box; its faces may lie at infinity.
   double distance(const Vec3& x, const Box3& box) const;
+  // What that is at least, at once.
+  double distance_at_least(const Vec3& x, const Box3& box) const;
   // Whether any comes near the line between two of its t.
   bool near(const LineGeometry& line, double t_begin, double t_end) const;
 
@@ -53,6 +55,7 @@ class ConditionRows {
   std::vector<int> first_row_;
   // Lengths in which 1 is the reach of a term; none: everything is near.
   std::vector<Mat3> metrics_;
+  double least_stretch_ = kInfinity;  // of a vector, by any of them
   std::vector<int> order_;
   std::vector<Node> nodes_;
 };

@@ -103,6 +103,7 @@ std::vector<int> Posterior::near(const Box3& region, double reach, int most_rows
   box.max = box.max + blend;
   std::vector<std::pair<double, int>> found;
   for (int i = 0; i < conditions_.points(); ++i) {
+    if (conditions_.distance_at_least(conditions_.point(i), box) > reach) continue;
     const double distance = conditions_.distance(conditions_.point(i), box);
     if (distance <= reach) found.emplace_back(distance, i);
   }

@@ -180,13 +180,15 @@ void Realisation::fill(const Vec3& origin, double spacing, const std::array<int,
   std::fill(g, g + slice * size[0], 0.0f);
   const auto row = [&](int i, int j) { return g + i * slice + j * size[2]; };
   for (LatticeField& field : lattices_) field.add_box(noise_, origin, spacing, size, g);
+  constexpr int kNeighbours = 16;  // along a row, that share most of their nodes with other rows
   for (Varying& part : varying_)
-    for (int j = 0; j < size[1]; ++j)
-      for (int i = 0; i < size[0]; ++i)
-        for (int k = 0; k < size[2]; ++k) {
-          const Vec3 x = origin + Vec3{double(i), double(j), double(k)} * spacing;
-          row(i, j)[k] += static_cast<float>(part.scale * part.lattice.sample(noise_, x).value);
-        }
+    for (int k0 = 0; k0 < size[2]; k0 += kNeighbours)
+      for (int j = 0; j < size[1]; ++j)
+        for (int i = 0; i < size[0]; ++i)
+          for (int k = k0; k < std::min(k0 + kNeighbours, size[2]); ++k) {
+            const Vec3 x = origin + Vec3{double(i), double(j), double(k)} * spacing;
+            row(i, j)[k] += static_cast<float>(part.scale * part.lattice.value(noise_, x));
+          }
   for (SpectralField& field : spectra_)
     for (int i = 0; i < size[0]; ++i)
       field.add_slice(origin + Vec3{i * spacing, 0, 0}, spacing, size[1], size[2], row(i, 0));

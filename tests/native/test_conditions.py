@@ -122,6 +122,40 @@ def test_thousands_of_points_in_blocks(n, full_size):
     assert np.abs(np.sqrt(v) - np.sqrt(np.diag(covariance))).max() < 0.1 * max(3 * truncation, 1e-4)
 
 
+def test_ten_thousand_points(seed):
+    """Values at all and normals at some of 10,000 points: the blocks against one system of all conditions within 14 length
+    scales of three places, and lines that a render draws there."""
+    n, length, deviation = 10_000, 0.015, 0.02
+    rng = np.random.default_rng(2)
+    out = rng.normal(size=(n, 3))
+    out /= np.linalg.norm(out, axis=1, keepdims=True)
+    points = out * (1 + 0.01 * rng.normal(size=(n, 1)))
+    normals = np.where(np.arange(n)[:, None] % 8 == 0, out, np.nan)
+    c = {"points": points, "values": 0.02 * np.sin(5 * out[:, 0]), "noise": np.full(n, 0.005), "normals": normals}
+    c["slopes"] = np.ones(n)
+    kernel, mean, sigma = gn.SquaredExponential(length), gn.SphereField((0, 0, 0), 1), gn.ConstantField(deviation)
+    gp, prior = (gn.GaussianProcess(mean, sigma, kernel, conditions=what) for what in (c, None))
+    plan = gp.plan()["conditions"]
+    assert plan.startswith("10000 points, 13750 values and slopes in ")
+    truncation = float(plan.split("truncation error of ")[1].split()[0])
+    assert truncation < 1e-2
+    for place in (np.array([0.6, -0.64, 0.48]), np.array([0, 0, 1.0]), np.array([-0.8, -0.6, 0])):
+        distance = np.linalg.norm(points - place, axis=1)
+        near = {key: value[distance < 14 * length] for key, value in c.items()}
+        x = points[distance < 5 * length] + rng.normal(0, 0.3 * length, (np.sum(distance < 5 * length), 3))
+        expected, covariance = (around := Regression(prior, near, mean, sigma)).law(x)
+        m, v = gp.posterior(x)
+        assert len(x) > 7 and np.abs(expected - mean(x)).max() > 0.3 * deviation
+        assert np.abs(m - expected).max() < 3 * truncation * deviation
+        assert np.abs(np.sqrt(v) - np.sqrt(np.diag(covariance))).max() < 3 * truncation * deviation
+    o, d, t = place + [0, 0, 0.06], np.array([0, 0, -1.0]), np.array([0.03, 0.05, 0.06])  # the last place, along the surface
+    far = gn.GaussianProcess(gn.SphereField((0, 0, 0), 0.9), sigma, kernel, conditions=dict(c, values=c["values"] + 0.1))
+    f = gn.line_values(far, np.tile(o, (200, 1)), np.tile(d, (200, 1)), t, tolerance=1e-9, seed=seed) - 0.1
+    f = f[np.isfinite(f).all(axis=1)]
+    assert len(f) > 190
+    check_law(f, *around.law(o + t[:, None] * d), 3 * truncation * deviation)
+
+
 @pytest.mark.parametrize("kernel", ["se", "matern 5/2"])
 def test_samples_and_realisations_follow_the_posterior(kernel, seed, full_size):
     n = 20_000 if full_size else 3000
