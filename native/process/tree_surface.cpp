@@ -58,7 +58,6 @@ TreeSurface::TreeSurface(TreePtr tree, const Affine& object_to_world, Memory mem
   }
   for (const ProcessSurface& leaf : leaves_) plans_.push_back(&leaf.planned());
   bounds_ = box_of(*tree_, tree_->root(), leaves_);
-  cut_ = CertainCut::of(*tree_, leaves_, memory, sampler, uncut_);
 }
 
 void TreeSurface::serve_inside() {
@@ -84,10 +83,6 @@ TreeHit TreeSurface::first_hit(March& march, std::span<Line> lines, const Ray& r
   }
   const Affine& to_object = leaves_[0].world_to_object();
   const LineGeometry geometry{to_object.point(ray.origin), to_object.vector(ray.direction)};
-  if (cut_ && !starts[0].inside)
-    if (const auto hit =
-            cut_->first_hit(*tree_, leaves_, geometry, lines, t_max, starts, rng, counters))
-      return *hit;
   // Leaves are drawn as they are: a ray inside sees their tree inside out (definitions B7).
   const ProcessTree& tree = starts[0].inside ? *inside_out_ : *tree_;
   const bool kept = memory() == Memory::global;
@@ -115,16 +110,14 @@ std::vector<std::pair<std::string, std::string>> TreeSurface::plan() const {
   if (leaves_.size() == 1 && tree_->is_single()) return leaves_[0].plan();
   std::vector<std::pair<std::string, std::string>> rows;
   const bool shared = tree_->noises() < static_cast<int>(leaves_.size());
-  rows.emplace_back(
-      "composition",
-      tree_->describe() + ", composed per realisation; noise " +
-          (shared ? "shared by some leaves" : "independent") +
-          (independent_union_ ? "; every leaf marched for itself, the first hit wins"
-           : cut_             ? "; " + cut_->describe()
-           : tree_->has_blends()
-               ? "; leaves marched together, all that are within the blend radii of "
-                 "the surface (skipping is bounded by them)"
-               : "; leaves marched together" + (uncut_.empty() ? "" : " (" + uncut_ + ")")));
+  rows.emplace_back("composition",
+                    tree_->describe() + ", composed per realisation; noise " +
+                        (shared ? "shared by some leaves" : "independent") +
+                        (independent_union_ ? "; every leaf marched for itself, the first hit wins"
+                         : tree_->has_blends()
+                             ? "; leaves marched together, all that are within the blend radii of "
+                               "the surface (skipping is bounded by them)"
+                             : "; leaves marched together"));
   for (std::size_t i = 0; i < leaves_.size(); ++i)
     for (const auto& [key, text] : leaves_[i].plan())
       rows.emplace_back("leaf[" + std::to_string(i) + "]." + key, text);

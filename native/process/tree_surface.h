@@ -1,11 +1,10 @@
 // A tree of processes placed in the world and planned for rendering: its leaves are ProcessSurfaces
 // that share one place, one memory model and one march. A tree of one leaf is that leaf and keeps
 // the march of its own; so do the leaves of a plain union of independent ones, whose first hit is
-// the first of theirs (definitions B5), and those that certain leaves cut (certain_cut.h).
+// the first of theirs (definitions B5).
 #pragma once
 
 #include "process/blend_march.h"
-#include "process/certain_cut.h"
 #include "process/surface.h"
 
 namespace gpis {
@@ -43,8 +42,6 @@ class TreeSurface {
   TreePtr tree_, inside_out_;
   bool independent_union_;
   std::vector<ProcessSurface> leaves_;
-  std::optional<CertainCut> cut_;
-  std::string uncut_;  // why there is none
   std::vector<const PlannedLine*> plans_;
   Box3 bounds_;
 };

@@ -26,10 +26,6 @@ TREES = {
     "intersection": gn.intersection(a, b),
     "difference": gn.difference(a, c),
     "nested": gn.difference(gn.union(a, b), c),
-    "cut by a certain plane": gn.intersection(
-        gn.GaussianProcess(0.0, 0.1, gn.SquaredExponential(0.3), bounds=([-1] * 3, [1] * 3)),
-        gn.GaussianProcess(gn.PlaneField((0.1, 0, 0), (1, 0, 2)), 0, gn.SquaredExponential(1)),
-    ),
     "cut by a certain box": gn.difference(a, certain_box((0, 0.6, 0.6), (1, 1, 1))),
     "smooth": gn.difference(gn.smooth_union(a, b, blend=0.3), c),
     "smooth, shared": gn.smooth_union(ball(-0.5, 0.5, 0.1), ball(0.4, 0.5, 0.15), blend=0.4, shared_noise=True),
