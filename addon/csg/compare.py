@@ -102,10 +102,13 @@ def sentence(live, fitted, samples, gain, titles):
     return text
 
 
-def write_image(settings, name, pixels):
-    """The image of these settings, made (with about that name) or written over."""
+def write_image(fitted, name, pixels):
+    """The image of a fit's comparison, made (with about that name) or written over."""
     height, width = pixels.shape[:2]
+    settings = fitted.gpis_csg
     image = settings.comparison_image
+    if any(obj != fitted and obj.gpis_csg.comparison_image == image for obj in bpy.data.objects):
+        image = None  # this one is a copy of the object whose image it is
     if image is not None and tuple(image.size) != (width, height):
         bpy.data.images.remove(image)
         image = None
@@ -140,6 +143,9 @@ class _Compare:
         obj = context.object
         if obj is None or obj.type != "VOLUME" or obj.gpis_csg.fitted_from is None:
             cls.poll_message_set("Make a GPIS that was fitted to a CSG list the active object first")
+            return False
+        if not (obj.gpis.enabled and obj.gpis_csg.fitted_from.gpis.enabled):
+            cls.poll_message_set("Switch on GPIS, in the Object properties, of both the fit and the object with its list")
             return False
         return True
 
@@ -180,7 +186,7 @@ class GPIS_OT_csg_compare_run(_Compare, Working, bpy.types.Operator):
         settings = self._fitted.gpis_csg
         titles = [quantity.title for quantity in quality.quantities(self._comparison.fit)]
         settings.comparison = sentence(*both, self.samples, gain, titles)
-        image = write_image(settings, f"{self._fitted.name}: Live, Fitted, Difference", pixels)
+        image = write_image(self._fitted, f"{self._fitted.name}: Live, Fitted, Difference", pixels)
         show(context, image)
         self.report({"INFO"}, f'Image "{image.name}". {settings.comparison}')
         return {"FINISHED"}

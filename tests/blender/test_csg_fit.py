@@ -111,6 +111,27 @@ def test_compare(operands):
     assert not bpy.ops.gpis.csg_compare.poll()
 
 
+def test_compare_of_a_copy_and_of_what_is_switched_off(operands):
+    """A copy's comparison leaves the picture of the original alone; there is nothing to compare where GPIS is off."""
+    build(operands[0], ["UNION", "UNION"])
+    assert bpy.ops.gpis.csg_fit(resolution=12, realisations=20) == {"FINISHED"}
+    fitted = bpy.context.object
+    assert bpy.ops.gpis.csg_compare(samples=2, width=16) == {"FINISHED"}
+    image = fitted.gpis_csg.comparison_image
+    copy = fitted.copy()
+    bpy.context.collection.objects.link(copy)
+    bpy.context.view_layer.objects.active = copy
+    for width in (16, 24):
+        assert bpy.ops.gpis.csg_compare(samples=2, width=width) == {"FINISHED"}
+        assert fitted.gpis_csg.comparison_image == image and tuple(image.size) == (48, 36)
+        assert copy.gpis_csg.comparison_image != image and copy.gpis_csg.comparison_image.size[0] == 3 * width
+    for obj in (copy, operands[0]):
+        obj.gpis.enabled = False
+        assert not bpy.ops.gpis.csg_compare.poll()
+        obj.gpis.enabled = True
+    assert bpy.ops.gpis.csg_compare.poll()
+
+
 def test_comparison_of_a_long_name(operands):
     """Blender cuts names to 63 bytes (255 from 5.0 on): the image is found again, and not another fit's."""
     a, b, c = operands
