@@ -19,6 +19,7 @@ METHODS = (
     ),
 )
 
+
 class _Query:
     """What compose_and_fit takes, from an object with its list."""
 
@@ -57,6 +58,8 @@ def make_volume(context, obj, fit, sentence):
     settings.sigma_source, settings.sigma_grid, settings.sigma_meaning = "GRID", "sigma", "STANDARD_DEVIATION"
     settings.kernel, settings.anisotropy, settings.anisotropy_factor = "SQUARED_EXPONENTIAL", "GRID", 1.0
     settings.memory = obj.gpis.memory
+    # Not rendered, grids are; what a brush begins with follows them.
+    settings.sigma, settings.length_scale = obj.gpis.sigma, obj.gpis.length_scale
     settings.enabled = True
     fitted.display_type = "BOUNDS"
     fitted.gpis_csg.quality, fitted.gpis_csg.fitted_from = sentence, obj

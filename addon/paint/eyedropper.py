@@ -4,6 +4,7 @@ import numpy as np
 
 from ..viewport import colour
 from . import stroke as strokes
+from .settings import LEAST_LENGTH
 
 
 def take(scene, obj, brush, fields, found):
@@ -22,7 +23,8 @@ def take(scene, obj, brush, fields, found):
         direction = combed_along(strokes.read(obj.data.gpis_strokes), found.location)
         brush.ratios = ratios(value, found.normal, direction)
         return " : ".join(f"{length:.3g}" for length in brush.ratios) + " (along, across, normal)"
-    setattr(brush, "sigma" if channel == "deviation" else "length_scale", value)
+    # 0 in the brush would follow the object.
+    setattr(brush, "sigma" if channel == "deviation" else "length_scale", max(value, LEAST_LENGTH))
     return f"{'σ' if channel == 'deviation' else 'ℓ'} {colour.length(scene, value)}"
 
 

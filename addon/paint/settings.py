@@ -74,6 +74,8 @@ _FALLOFFS = (
 _SHARES = {"sigma": 2.5, "length_scale": 0.5}
 # Of an object that is no GPIS.
 _LENGTH = 0.1
+# The least that can be typed or taken; 0 follows the object.
+LEAST_LENGTH = 1e-6
 
 _PIXELS = 50.0
 
@@ -119,7 +121,7 @@ def _length(name):
         return length_for(settings, name, getattr(bpy.context, "active_object", None))
 
     def write(settings, value):
-        settings[name] = max(value, 0.0)
+        settings[name] = max(value, LEAST_LENGTH) if value > 0 else 0.0
 
     return {"get": read, "set": write}
 

@@ -74,6 +74,7 @@ def test_compare(operands):
     assert bpy.ops.gpis.csg_fit(resolution=24, realisations=200, seed=3) == {"FINISHED"}
     fitted = bpy.context.object
     assert fitted.gpis_csg.fitted_from == a
+    assert (fitted.gpis.sigma, fitted.gpis.length_scale) == (a.gpis.sigma, a.gpis.length_scale), "what brushes begin with"
     hidden = [obj.hide_render for obj in bpy.data.objects]
     assert bpy.ops.gpis.csg_compare(samples=32, width=32) == {"FINISHED"}
     assert [obj.hide_render for obj in bpy.data.objects] == hidden

@@ -220,13 +220,13 @@ def comb(module, obj, lengths, direction=(1, 0, 0), symmetry=(False, False, Fals
     painting.finish()
 
 
-def take(module, obj, location=(0, 0, 1)):
+def take(module, obj, location=(0, 0, 1), fields=None):
     """What the eyedropper says it took at a place of the unit sphere."""
     bake, hover = module("paint.bake"), module("paint.hover")
     place = np.array(location, dtype=float)
     found = hover.Hover(place, place, Vector(location), Vector(location), 0.01, 1.0)
     scene = bpy.context.scene
-    return module("paint.eyedropper").take(scene, obj, scene.gpis.paint, bake.fields(obj), found)
+    return module("paint.eyedropper").take(scene, obj, scene.gpis.paint, fields or bake.fields(obj), found)
 
 
 @pytest.mark.parametrize("lengths", [(6, 1, 1), (1, 6, 1), (1, 1, 6), (2, 4, 1), (1, 4, 2), (6, 6, 1)])
@@ -273,6 +273,14 @@ def test_the_eyedropper_takes_values(module, sphere, brush):
         got = getattr(brush, name)
         assert (tuple(got) if channel == "ALBEDO" else got) == pytest.approx(value, rel=1e-4)
         assert said == {"DEVIATION": "σ 25 cm", "LENGTH_SCALE": "ℓ 50 cm", "ALBEDO": "albedo 0.20, 0.40, 0.60"}[channel]
+    # None at all is not "as the object has it", which a brush without a value means.
+    class Certain:
+        values = staticmethod(lambda channel, places: np.zeros(len(places)))
+
+    brush.channel = "DEVIATION"
+    assert take(module, sphere, fields=Certain) == "σ 0 m" and brush.brush(sphere)["value"] == pytest.approx(1e-6)
+    brush.sigma = 1e-30
+    assert brush.sigma == pytest.approx(1e-6)
     for channel, sentence in (("MEAN", "The mean has no value to take"), ("CONDITION", "Condition points have no value")):
         brush.channel = channel
         with pytest.raises(ValueError, match=sentence):

@@ -225,7 +225,7 @@ std::vector<Case> cases() {
   };
 }
 
-// Of must show 6 of the issue "the process, exact".
+// Length scales that grow, step and turn.
 std::vector<std::pair<const char*, TensorFieldPtr>> fields() {
   return {{"e^{x/4}", test::along_x(test::growing, 97)},
           {"4 within 1", test::along_x(test::stepping, 641)},
