@@ -178,3 +178,22 @@ def test_light_sampling_changes_no_expectation(material, memory, seed, full_size
     (on, var_on), (off, var_off) = means
     assert var_on < var_off
     check_z(on - off, 0, np.sqrt(var_on + var_off), f"{material}, {memory}")
+
+
+@pytest.mark.stats
+@pytest.mark.parametrize("material", ["lambert", "mirror", "conductor"])
+def test_sampling_an_uneven_sky_changes_no_expectation(material, seed, full_size):
+    """A sky of which one part in 32 is bright is sampled there, and found by scattering elsewhere."""
+    sky = np.full((16, 32, 3), 0.5)
+    sky[8:12, 4:8] = 6
+    means = []
+    for light_sampling in (True, False):
+        settings = {"light_sampling": light_sampling}
+        scene = sphere(0.5 * LENGTH_SCALE, material, color=(0.7,) * 3, world={"image": sky}, settings=settings)
+        result = gn.render(gn.Scene(scene), 12, 12, samples=16384 if full_size else 4096, seed=seed + light_sampling)
+        assert (result.stats["shadow_rays"] > 0) == light_sampling
+        image, variance = (result.passes[p][..., 0].astype(float) for p in ("combined", "variance"))
+        means.append((image.mean(), variance.sum() / image.size**2))
+    (on, var_on), (off, var_off) = means
+    assert var_on < var_off
+    check_z(on - off, 0, np.sqrt(var_on + var_off), material)
