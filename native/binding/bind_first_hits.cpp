@@ -48,6 +48,9 @@ NumberArray line_values_array(const py::object& gp, const py::object& origins,
   const FirstHitsSetup setup = first_hits_setup({gp, origins, directions, memory, start, inside,
                                                  first_index, sampler, tolerance, seed, threads},
                                                 t_max);
+  if (setup.surface.leaves()[0].must_stand_alone())
+    throw std::invalid_argument(
+        "the sampler first_passage knows where a ray ends and nothing of the way to it.");
   const auto values = without_python([&] { return line_values(setup.surface, setup.query, t); });
   std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(setup.query.rays.size()),
                                  static_cast<py::ssize_t>(t.size())};
@@ -76,7 +79,8 @@ void bind_first_hits(py::module_& m) {
       "('none', 'renewal', 'renewal+', 'global-n' for n segments, 'global').\n"
       "inside: (N,) bool, rays that travel inside the body: their first change of sign to "
       "outside.\n"
-      "sampler: 'auto', 'convolution', 'markov', 'spectral', 'nystrom', 'dense' or 'realisation'. "
+      "sampler: 'auto', 'convolution', 'markov', 'spectral', 'nystrom', 'dense', 'realisation' or "
+      "'first_passage'. "
       "tolerance: probability of a missed root per "
       "ray. Row i uses the random\n"
       "stream (seed, first_index + i), whatever the number of threads.");

@@ -234,9 +234,10 @@ ObjectDescription read_object(const py::handle& value, const std::string& path, 
            "takes a GaussianProcess or a CSG tree of them, got " + shown(process));
   o.process = tree_argument(process, r.path_of("process"));
   o.memory = memory_argument(r.text("memory", "renewal+"), r.path_of("memory"));
-  o.sampler = static_cast<Sampler>(r.choice(
-      "sampler", {"auto", "convolution", "markov", "spectral", "nystrom", "dense", "realisation"},
-      0));
+  o.sampler = static_cast<Sampler>(r.choice("sampler",
+                                            {"auto", "convolution", "markov", "spectral", "nystrom",
+                                             "dense", "realisation", "first_passage"},
+                                            0));
   if (r.has("albedo")) o.albedo = color_field_argument(r.required("albedo"), r.path_of("albedo"));
   r.finish("a gpis object");
   return o;

@@ -24,9 +24,10 @@ Sampler sampler_argument(const std::string& name) {
   if (name == "spectral") return Sampler::spectral;
   if (name == "dense") return Sampler::dense;
   if (name == "realisation") return Sampler::realisation;
+  if (name == "first_passage") return Sampler::first_passage;
   throw std::invalid_argument("sampler is '" + name +
                               "', it takes 'auto', 'convolution', 'markov', 'spectral', 'nystrom', "
-                              "'dense' or 'realisation'.");
+                              "'dense', 'realisation' or 'first_passage'.");
 }
 
 double tolerance_argument(double tolerance) {

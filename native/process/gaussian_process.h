@@ -39,6 +39,15 @@ struct Memory {
   Kind kind;
   int count;  // of segments
 };
-enum class Sampler { automatic, convolution, markov, spectral, nystrom, dense, realisation };
+enum class Sampler {
+  automatic,
+  convolution,
+  markov,
+  spectral,
+  nystrom,
+  dense,
+  realisation,
+  first_passage,
+};
 
 }  // namespace gpis

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 
 #include "process/line_impl.h"
 #include "process/line_noise.h"
@@ -46,5 +47,11 @@ std::unique_ptr<LineSampler> make_dense(const GaussianProcess& process, const Bo
 std::unique_ptr<LineSampler> make_realisation(const GaussianProcess& process, const Box3& bounds);
 std::unique_ptr<LineSampler> make_nystrom(const GaussianProcess& process, const Box3& bounds);
 std::unique_ptr<LineSampler> make_joint_dense(const GaussianProcess& process, const Box3& bounds);
+// The table of first passages, drawn by a path of that correlation error; the process it cannot
+// serve, in words that follow "since", empty where it can.
+std::unique_ptr<LineSampler> make_first_passage(const GaussianProcess& process, const Box3& bounds,
+                                                double missed_root, double correlation_error);
+std::string why_no_first_passage(const GaussianProcess& process, const Box3& bounds,
+                                 double missed_root);
 
 }  // namespace gpis

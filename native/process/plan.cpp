@@ -8,6 +8,7 @@
 #include "process/conditioned_sampler.h"
 #include "process/conditions.h"
 #include "process/covariance.h"
+#include "process/first_passage.h"
 #include "process/gaussian_process.h"
 #include "process/realisation.h"
 #include "process/sum_path.h"
@@ -76,6 +77,7 @@ Choice choose(const GaussianProcess& process, Sampler asked) {
       return {
           make_realisation,
           "realisation: " + Realisation(process, Realisation::Access::rays, nullptr).describe()};
+    case Sampler::first_passage:
     case Sampler::automatic:
       break;
   }
@@ -141,6 +143,22 @@ void check_steps(const PlannedLine& plan, const Range& mean, const Range& sigma,
       " steps that are the most. Take a longer length_scale, smaller bounds, or a smaller mean.");
 }
 
+// Puts a table in the place of the march that draws it, where it serves the process.
+void plan_first_passage(PlannedLine& plan, const GaussianProcess& process, double missed_root,
+                        bool asked) {
+  const std::string why = why_no_first_passage(process, plan.bounds, missed_root);
+  if (!why.empty() && asked)
+    refuse("The sampler first_passage does not serve this process, since ", why, ".");
+  if (!why.empty()) return;
+  const std::size_t count = FirstPassage::excursions(missed_root);
+  plan.line_sampler =
+      make_first_passage(process, plan.bounds, missed_root, plan.line_sampler->correlation_error());
+  plan.sampler_reason =
+      "first_passage: mean and deviation are constant, hits come out of a table of " +
+      std::to_string(count) + " excursions (standard deviation of a probability: " +
+      number_text(std::round(0.5e5 / std::sqrt(count)) / 1e5) + "), nothing is marched";
+}
+
 }  // namespace
 
 std::shared_ptr<const GaussianProcess> inside_out(const GaussianProcess& process) {
@@ -158,7 +176,7 @@ std::shared_ptr<const GaussianProcess> inside_out(const GaussianProcess& process
 }
 
 PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Memory memory,
-                      Sampler sampler, double missed_root) {
+                      Sampler sampler, double missed_root, bool alone) {
   PlannedLine plan;
   process = normalised(std::move(process));
   const Range sigma = process->sigma->range();
@@ -240,6 +258,9 @@ PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Memory mem
       const Choice choice = choose(*process, sampler);
       plan.line_sampler = choice.make(*process, plan.bounds);
       plan.sampler_reason = choice.reason;
+      const bool asked = sampler == Sampler::first_passage;
+      if (asked || (alone && sampler == Sampler::automatic))
+        plan_first_passage(plan, *process, missed_root, asked);
     }
     plan.condition_pull = plan.line_sampler->condition_pull();
   }

@@ -27,8 +27,9 @@ struct PlannedLine {
 // The process of -f: rays inside the body march it as others march f (definitions B7).
 std::shared_ptr<const GaussianProcess> inside_out(const GaussianProcess& process);
 
-// Throws std::invalid_argument with a sentence where the process cannot be rendered.
+// Throws std::invalid_argument with a sentence where the process cannot be rendered. `alone`: no
+// ray ends inside the bounds on anything else, so that first passages may come out of a table.
 PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Memory memory,
-                      Sampler sampler, double missed_root);
+                      Sampler sampler, double missed_root, bool alone = false);
 
 }  // namespace gpis

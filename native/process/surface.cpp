@@ -66,7 +66,24 @@ ProcessSurface::ProcessSurface(std::shared_ptr<const GaussianProcess> process,
 void ProcessSurface::serve_inside() {
   if (planned_inside_) return;
   planned_inside_ = std::make_shared<PlannedLine>(
-      plan_line(inside_out(*planned_->process), memory_, sampler_, missed_root_));
+      plan_line(inside_out(*planned_->process), memory_, sampler_, missed_root_, alone_));
+}
+
+bool ProcessSurface::gains_alone() const {
+  if (must_stand_alone()) return true;
+  const bool planned =
+      memory_ == Memory::none || memory_ == Memory::renewal || memory_ == Memory::renewal_plus;
+  return planned && sampler_ == Sampler::automatic && planned_->sigma_max > 0 &&
+         why_no_first_passage(*planned_->process, planned_->bounds, missed_root_).empty();
+}
+
+void ProcessSurface::stands_alone() {
+  alone_ = true;
+  planned_ = std::make_shared<PlannedLine>(
+      plan_line(planned_->process, memory_, sampler_, missed_root_, alone_));
+  if (!planned_inside_) return;
+  planned_inside_ = nullptr;
+  serve_inside();
 }
 
 double ProcessSurface::first_hit(Line& line, const Ray& ray, double t_max, const Start& start,

@@ -90,6 +90,13 @@ class ProcessSurface {
   // Plans rays that travel inside the body too; before the first of them.
   void serve_inside();
 
+  // Whether hits come out of a table of first passages, whose lines say nothing of the way there,
+  // if no ray ends inside the bounds on anything else; and whether they are asked to.
+  bool gains_alone() const;
+  bool must_stand_alone() const { return sampler_ == Sampler::first_passage; }
+  // It is so; before the first ray.
+  void stands_alone();
+
   Memory memory() const { return memory_; }
   const PlannedLine& planned() const { return *planned_; }
   const Affine& world_to_object() const { return world_to_object_; }
@@ -136,6 +143,7 @@ class ProcessSurface {
   Box3 world_bounds_;
   Sampler sampler_;
   double missed_root_;
+  bool alone_ = false;
   std::shared_ptr<const PlannedLine> planned_, planned_inside_;
 };
 

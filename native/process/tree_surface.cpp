@@ -50,6 +50,10 @@ TreeSurface::TreeSurface(TreePtr tree, const Affine& object_to_world, Memory mem
         throw std::invalid_argument("the kernel " + leaves[i].process->kernel->describe() +
                                     " has no gradient, and trees are marched by gradients: take "
                                     "Matern 3/2 for a rough surface.");
+      if (!tree_->is_single() && sampler == Sampler::first_passage)
+        throw std::invalid_argument(
+            "the sampler first_passage serves a process of its own, not the leaves of a tree, "
+            "which are marched together: take 'auto'.");
       leaves_.emplace_back(leaves[i].process, object_to_world, memory, sampler, missed_root);
     } catch (const std::invalid_argument& error) {
       if (leaves.size() == 1) throw;
@@ -62,6 +66,11 @@ TreeSurface::TreeSurface(TreePtr tree, const Affine& object_to_world, Memory mem
 
 void TreeSurface::serve_inside() {
   if (tree_->is_single()) leaves_[0].serve_inside();
+}
+
+void TreeSurface::stands_alone() {
+  leaves_[0].stands_alone();
+  plans_[0] = &leaves_[0].planned();
 }
 
 TreeHit TreeSurface::first_hit(March& march, std::span<Line> lines, const Ray& ray, double t_max,

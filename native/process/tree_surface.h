@@ -25,6 +25,9 @@ class TreeSurface {
 
   // Plans rays that travel inside the body too; before the first of them.
   void serve_inside();
+  // As ProcessSurface's; a tree of several leaves marches them, whatever else there is.
+  bool gains_alone() const { return tree_->is_single() && leaves_[0].gains_alone(); }
+  void stands_alone();
 
   // The first t in (0, t_max) where F changes to F <= 0 (inside: to F >= 0), and the leaf it comes
   // from. `lines` and

@@ -3,6 +3,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "scene/alone.h"
 #include "scene/check.h"
 #include "scene/scene_impl.h"
 
@@ -85,6 +86,7 @@ Scene::Scene(SceneDescription description)
   check(d);
   for (const MaterialDescription& m : d.materials) impl_->materials.push_back(make_material(m));
   build_objects();
+  find_alone(d, *impl_);
   if (impl_->triangles) impl_->triangles->commit();
   std::vector<Box3> boxes;
   for (const auto& body : impl_->bodies) boxes.push_back(body.surface.bounds());
