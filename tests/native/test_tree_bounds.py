@@ -121,36 +121,55 @@ MATERIALS = {
 }
 
 
-def render(tree, material, matrix, furnace, seed):
+FLOOR = {
+    "vertices": np.array([(-3, -3, -1.6), (3, -3, -1.6), (3, 3, -1.6), (-3, 3, -1.6)]),
+    "triangles": np.array([(0, 1, 2), (0, 2, 3)]),
+}
+
+
+def render(tree, material, matrix, seed, *, samples=128, white=False, floor=False):
+    """A body from z = 6, under an uneven sky or a white one, over a floor."""
     eye = np.eye(4)
     eye[2, 3] = 6
     leaves = len(tree.leaves) if hasattr(tree, "leaves") else 1
-    cut = {"name": "Cut", "type": "gpis", "process": tree, "materials": ["m"] * leaves, "memory": "renewal+", "matrix": matrix}
-    sky = np.linspace(0, 1, 8)[:, None, None] * np.ones((8, 4, 3))
+    body = {"name": "Cut", "type": "gpis", "process": tree, "materials": ["m"] * leaves, "memory": "renewal+", "matrix": matrix}
+    sheet = {"name": "Floor", "type": "mesh", "mesh": "Floor", "materials": ["grey"]}
     description = {
         "version": 1,
-        "settings": {} if furnace else {"max_bounces": 8},
-        "camera": {"type": "orthographic", "matrix": eye, "width": 3.0},
-        "world": {"color": (1, 1, 1)} if furnace else {"image": sky},
-        "materials": {"m": MATERIALS[material]},
-        "objects": [cut],
+        "settings": {} if white else {"max_bounces": 8},
+        "camera": {"type": "orthographic", "matrix": eye, "width": 2.0 if floor else 3.0},
+        "world": {"color": (1, 1, 1)} if white else {"image": np.linspace(0, 1, 8)[:, None, None] * np.ones((8, 4, 3))},
+        "materials": {"m": MATERIALS[material], "grey": {"type": "lambert", "color": (0.9, 0.9, 0.9)}},
+        "meshes": {"Floor": FLOOR} if floor else {},
+        "objects": [body, sheet] if floor else [body],
     }
-    return gn.render(gn.Scene(description), 8, 8, samples=64 if furnace else 128, seed=seed)
+    result = gn.render(gn.Scene(description), 8, 8, samples=samples, seed=seed)
+    assert result.stats["line_entry_inside"] == result.stats["nan_samples"] == 0
+    pixels, variance = (result.passes[p][..., 0].astype(float) for p in ("combined", "variance"))
+    return pixels, pixels.mean(), np.sqrt(variance.sum()) / variance.size, result.stats
 
 
 @pytest.mark.parametrize("material", MATERIALS)
 @pytest.mark.parametrize("name", ["plane", "constant -20 sigma"])
 def test_light_is_that_alone(name, material, seed):
-    """Sheared: mean radiance and path vertices as alone; nothing is lost in a white world."""
-    trees = [body(name)] + [TREES[t](body(name)) for t in ("less far", "in everything")]
-    found = []
-    for i, tree in enumerate(trees):
-        result = render(tree, material, SHEARED, False, seed + i)
-        pixels, variance = (result.passes[p][..., 0].astype(float) for p in ("combined", "variance"))
-        found.append((pixels.mean(), variance.sum() / variance.size**2))
-        assert result.stats["line_entry_inside"] == result.stats["nan_samples"] == 0
-    for mean, variance in found[1:]:
-        check_z(mean - found[0][0], 0, np.sqrt(variance + found[0][1]), f"{name}, {material}")
-    if name == "plane":  # constant and deep: paths are long
-        white = render(trees[1], material, SHEARED, True, seed).passes["combined"]
-        assert np.allclose(white, 1, atol=1e-6)
+    """Sheared: mean radiance as alone; nothing is lost in a white world."""
+    _, alone, error, _ = render(body(name), material, SHEARED, seed)
+    for i, tree in enumerate(("less far", "in everything")):
+        pixels, mean, own, _ = render(TREES[tree](body(name)), material, SHEARED, seed + 1 + i)
+        check_z(mean, alone, np.hypot(own, error), f"{name}, {material}, {tree}")
+    if name == "plane":  # others are deep on every side: paths are long
+        pixels, *_ = render(TREES["less far"](body(name)), material, SHEARED, seed, samples=64, white=True)
+        assert np.allclose(pixels, 1, atol=1e-6)
+
+
+@pytest.mark.parametrize("tree", ["less far", "and far", "smooth and far"])
+def test_a_ray_in_glass_leaves_the_bounds_of_its_operand(tree, seed):
+    """Definitions B4: where the bounds of the glass end, the ray is in it no more, however far others of a union reach."""
+    found = [
+        render(t, "glass", np.eye(4), seed + i, samples=512, floor=True)
+        for i, t in enumerate([body("constant -3 sigma"), TREES[tree](body("constant -3 sigma"))])
+    ]
+    (_, alone, error, stats), (_, mean, own, tree_stats) = found
+    check_z(mean, alone, np.hypot(own, error), tree)
+    check_z(tree_stats["bounds_exits"], stats["bounds_exits"], 4 * np.sqrt(2 * stats["bounds_exits"]), "exits")  # several a path
+    assert stats["bounds_exits"] > 10_000
