@@ -190,8 +190,8 @@ bool TreeLines::skip_certain(const ProcessTree& tree, TreeSample& from, double& 
   Stretch sure = certain(tree, tree.root());
   if (sure.sign < 0 && outside) enter_outside(tree, a, sure);
   if (sure.sign == 0) return false;
-  // Inside of what has no deviation: the camera is, or bounds cut it or a subtracted leaf off. Where
-  // a ray inside a body leaves its bounds, there is no surface to count (B4).
+  // Inside of what has no deviation: the camera is, or bounds cut it or a subtracted leaf off.
+  // Where a ray inside a body leaves its bounds, there is no surface to count (B4).
   const bool solid = std::any_of(leaves.begin(), leaves.end(),
                                  [](const Leaf& l) { return l.sign > 0 && l.certain < 0; });
   if (sure.sign < 0 && outside && solid) ++counters_->line_entry_inside;
