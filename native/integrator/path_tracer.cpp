@@ -232,10 +232,7 @@ bool PathTracer::Impl::closest(const Ray& ray, double t_max, Vertex& v) {
 // no index changes (definitions B4).
 void PathTracer::Impl::leave_bounds(const Ray& ray, double t) {
   for (const int b : path.begun()) {
-    if (!path.inside(b)) continue;
-    const auto [enter, leave] =
-        clip(scene.bodies[b].surface.bounds(), ray.origin, ray.direction, 0, t);
-    if (enter <= leave && leave >= t) continue;
+    if (!path.inside(b) || !scene.bodies[b].surface.leaves_bounds(ray, t)) continue;
     path.cross(b);
     ++counters->bounds_exits;
   }

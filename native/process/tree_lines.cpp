@@ -1,5 +1,7 @@
 #include "process/tree_lines.h"
 
+#include <algorithm>
+
 #include "field/above.h"
 #include "field/constant_field.h"
 
@@ -154,12 +156,45 @@ TreeLines::Stretch TreeLines::certain(const ProcessTree& tree, int node) const {
   return dominated.sign != 0 ? dominated : all;
 }
 
+// Bounds let a ray into the certain inside of random leaves, by their face or at a camera between
+// them. Where f is drawn first it is drawn outside (definitions B4), in a tree as alone: what is
+// certain of as many leaves as F > 0 takes, the least deep first, is taken back, and of those that
+// are about as likely.
+void TreeLines::enter_outside(const ProcessTree& tree, double a, Stretch& sure) {
+  struct Inside {
+    double depth;  // squared, in deviations: P(f > 0) ~ exp(-depth / 2)
+    Leaf* leaf;
+  };
+  std::vector<Inside> all;
+  for (Leaf& l : leaves) {
+    const bool inside = l.certain == (l.sign > 0 ? -1 : 1);
+    if (!inside || noises[l.noise].begun || l.plan->sigma_max == 0) continue;
+    enter(l, a);
+    const LeafPoint p = combine(l, a, 0, 0);
+    if (p.sigma > 0) all.push_back({(p.mean / p.sigma) * (p.mean / p.sigma), &l});
+  }
+  std::sort(all.begin(), all.end(), [](auto& x, auto& y) { return x.depth < y.depth; });
+  double taken = 0;
+  for (const auto& [depth, l] : all) {
+    const double skip = l->plan->skip_threshold / l->plan->sigma_max;
+    if (sure.sign >= 0 && depth > taken + skip * skip) break;
+    l->certain = 0;
+    l->until = -kInfinity;
+    taken += depth;
+    if (sure.sign < 0) sure = certain(tree, tree.root());
+  }
+}
+
 bool TreeLines::skip_certain(const ProcessTree& tree, TreeSample& from, double& a, bool& outside) {
   for (std::size_t i = 0; i < leaves.size(); ++i) look_ahead(leaves[i], a, from.leaf[i]);
-  const Stretch sure = certain(tree, tree.root());
+  Stretch sure = certain(tree, tree.root());
+  if (sure.sign < 0 && outside) enter_outside(tree, a, sure);
   if (sure.sign == 0) return false;
-  // Inside for certain: the camera is, or bounds cut a subtracted leaf off.
-  if (sure.sign < 0 && outside) ++counters_->line_entry_inside;
+  // Inside of what has no deviation: the camera is, or bounds cut it or a subtracted leaf off.
+  // Where a ray inside a body leaves its bounds, there is no surface to count (B4).
+  const bool solid = std::any_of(leaves.begin(), leaves.end(),
+                                 [](const Leaf& l) { return l.sign > 0 && l.certain < 0; });
+  if (sure.sign < 0 && outside && solid) ++counters_->line_entry_inside;
   outside = sure.sign > 0;
   a = sure.until;
   for (Leaf& l : leaves) l.engaged = false;

@@ -93,7 +93,7 @@ class TreeLines {
   };
   Stretch certain(const ProcessTree& tree, int node) const;
   // Where F is certain at a: leads a to where it is not, `outside` to F > 0 there, forgets what was
-  // looked at, and returns true.
+  // looked at, and returns true. A ray outside that enters a random leaf has it drawn instead.
   bool skip_certain(const ProcessTree& tree, TreeSample& from, double& a, bool& outside);
 
   // f = μ + σ g, f' = μ' + gσ' + σ g' (math.md §2).
@@ -107,6 +107,7 @@ class TreeLines {
   std::vector<Noise> noises;
 
  private:
+  void enter_outside(const ProcessTree& tree, double a, Stretch& sure);
   void noise_at(Noise& noise, double t, double& g, double& dg);
 
   LineGeometry geometry_;

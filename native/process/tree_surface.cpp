@@ -73,6 +73,29 @@ void TreeSurface::stands_alone() {
   plans_[0] = &leaves_[0].planned();
 }
 
+bool TreeSurface::leaves_bounds(const Ray& ray, double t) const {
+  const Affine& to_object = leaves_[0].world_to_object();
+  const LineGeometry line{to_object.point(ray.origin), to_object.vector(ray.direction)};
+  // The least that F can be there.
+  thread_local std::vector<double> least;
+  least.assign(leaves_.size(), -kInfinity);
+  bool left = false;
+  for (std::size_t k = 0; k < leaves_.size(); ++k) {
+    const auto [enter, leave] = clip(plans_[k]->bounds, line.origin, line.direction, 0, t);
+    if (enter <= leave && leave >= t) continue;
+    least[k] = sign(k) * kInfinity;
+    left = true;
+  }
+  for (std::size_t k = 0; k < leaves_.size() && left; ++k) {
+    const PlannedLine& plan = *plans_[k];
+    const double clear = plan.skip_threshold + tree_->leaves()[k].lift;
+    if (std::isinf(clear) || least[k] > 0) continue;
+    if (plan.process->mean->value(line.origin + line.direction * t) > clear)
+      least[k] = sign(k) * kInfinity;
+  }
+  return left && tree_->compose(least.data(), nullptr) > 0;
+}
+
 TreeHit TreeSurface::first_hit(March& march, std::span<Line> lines, const Ray& ray, double t_max,
                                std::span<const Start> starts, Rng& rng, Counters& counters) const {
   if (tree_->is_single()) {

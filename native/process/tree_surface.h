@@ -22,6 +22,9 @@ class TreeSurface {
   double sign(int leaf) const { return tree_->leaves()[leaf].sign; }
   // World-space box outside of which F > 0 for certain (infinite where unbounded).
   const Box3& bounds() const { return bounds_; }
+  // Whether F > 0 at t for certain, the ray being outside of bounds of leaves there: of the operand
+  // that it was in, however far others of a union reach.
+  bool leaves_bounds(const Ray& ray, double t) const;
 
   // Plans rays that travel inside the body too; before the first of them.
   void serve_inside();
