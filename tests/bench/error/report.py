@@ -181,11 +181,11 @@ def counts_table(found):
     return table(columns, body)
 
 
-def scene_section(known, found):
+def scene_section(known, found, pictures):
     scene = found["scene"]
     there = [r for r in found["rows"] if "found" in r]
     groups = [[(r["key"], r["title"], r["found"]) for r in there if r["group"] == g] for g in ("sampler", "truth")]
-    plot = plots.scene_plot(*groups, paper_points(known, found)) if there else ""
+    plot = plots.scene_plot(*groups, paper_points(known, found), pictures / f"{scene.name}.png") if there else ""
     head = f'<div class="head"><img src="{plots.picture(found["picture"])}" alt=""><div><h2>{html.escape(scene.title)}</h2>'
     head += f"<div>{html.escape(scene.what)}</div></div></div>"
     return f"{head}{plot}{main_table(found)}<details><summary>Operations, memory</summary>{counts_table(found)}</details>"
@@ -217,9 +217,9 @@ def rates_section(known):
     return text
 
 
-def calibration_section(known):
+def calibration_section(known, pictures):
     rows = [
-        (f["scene"].title, f["calibration"]["samples"], f["calibration"]["ratio"], f["calibration"]["error"])
+        (f["scene"].title + ", not judged" * f["scene"].heavy_tails, *(f["calibration"][k] for k in ("samples", "ratio", "error")))
         for f in known["scenes"]
         if f["calibration"]
     ]
@@ -227,7 +227,8 @@ def calibration_section(known):
         return ""
     repeats = max(r["cell"]["repeats"] for f in known["scenes"] for r in f["rows"] if r["key"] == "default" and "found" in r)
     text = f"<h2>Is the estimated error the error?</h2><p class=note>Mean over {repeats} seeds of the film's estimated relMSE, divided "
-    text += "by the true one against the reference, with two standard errors. Green: what is asked.</p>" + plots.calibration_plot(rows)
+    text += "by the true one against the reference, with two standard errors. Green: what is asked, where a "
+    text += "sample has a finite kurtosis.</p>" + plots.calibration_plot(rows, pictures / "calibration.png")
     columns = sorted({n for row in rows for n in row[1]})
     body = []
     for title, samples, ratio, error in rows:
@@ -265,6 +266,9 @@ def left_out_section(known):
 
 
 def write(known, path):
+    """The page, and beside it `pictures`: its plots as .png, for the docs."""
+    pictures = path.parent / "pictures"
+    pictures.mkdir(parents=True, exist_ok=True)
     style = f"<style>{STYLE}</style>"
     text = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>GPIS: error against run time</title>{style}'
     text += "<h1>Error against run time</h1>"
@@ -274,9 +278,8 @@ def write(known, path):
     least = min(r["reference"]["samples"] / r["cell"]["samples"][-1] for _, r in measured(known)) if measured(known) else 0
     text += f"noise taken off. References have at least {least:.0f} times the samples, of another sampler where there is one.</p>"
     text += left_out_section(known) + "<h2>What is found</h2>" + findings(known)
-    text += rates_section(known) + calibration_section(known)
-    text += "".join(scene_section(known, found) for found in known["scenes"])
+    text += rates_section(known) + calibration_section(known, pictures)
+    text += "".join(scene_section(known, found, pictures) for found in known["scenes"])
     text += HOW_TO_READ
     text += comparison_section(known) + "</html>\n"
-    path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text)
