@@ -123,7 +123,10 @@ def calibration_plot(rows, png=None):
         axes.axhline(1, color="#888888", lw=0.8)
         for i, (title, samples, ratio, error) in enumerate(rows):
             shift = 1.025 ** (i - len(rows) / 2)
-            axes.errorbar(np.array(samples) * shift, ratio, yerr=2 * np.array(error), marker="o", ms=3.5, lw=1, label=title)
+            axes.errorbar(
+                np.array(samples) * shift, ratio, yerr=2 * np.array(error), marker="o", ms=3.5, lw=1, label=title,
+                color=f"C{i}" if i < 10 else "black",
+            )  # fmt: skip
         axes.set_xscale("log", base=2)
         axes.set_xticks(sorted({n for row in rows for n in row[1]}))
         axes.xaxis.set_major_formatter(matplotlib.ticker.FuncFormatter(lambda v, _: f"{v:g}"))
