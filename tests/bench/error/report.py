@@ -108,7 +108,8 @@ def findings(known):
                 slack = 2 * error if known["effort"] == "quick" else 0  # of few seeds and pixels
                 if not CALIBRATED[0] - slack <= ratio <= CALIBRATED[1] + slack:
                     wrong.append(f"{found['scene'].title} at {samples} samples ({ratio:.2f})")
-    text = f"Estimated error over true error lies in [{CALIBRATED[0]}, {CALIBRATED[1]}] in {count - len(wrong)} of {count} cases"
+    within = " (within two standard errors)" if known["effort"] == "quick" else ""
+    text = f"Estimated error over true error lies in [{CALIBRATED[0]}, {CALIBRATED[1]}]{within} in {count - len(wrong)} of {count} cases"
     lines.append(mark(not wrong, text + (": not for " + ", ".join(wrong) if wrong else "") + "."))
     short = [f"{r['name']} ({r['rate'] / r['asked']:.2f} of it)" for r in known["rates"] if r["rate"] < r["asked"]]
     text = f"The rate that is asked for is reached in {len(known['rates']) - len(short)} of {len(known['rates'])} scenes"
