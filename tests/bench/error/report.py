@@ -109,7 +109,7 @@ def findings(known):
                 if not CALIBRATED[0] - slack <= ratio <= CALIBRATED[1] + slack:
                     wrong.append(f"{found['scene'].title} at {samples} samples ({ratio:.2f})")
     within = " (within two standard errors)" if known["effort"] == "quick" else ""
-    text = f"Estimated error over true error lies in [{CALIBRATED[0]}, {CALIBRATED[1]}]{within} in {count - len(wrong)} of {count} cases"
+    text = f"Estimated over true error lies in [{CALIBRATED[0]}, {CALIBRATED[1]}]{within} in {count - len(wrong)} of {count} cases"
     lines.append(mark(not wrong, text + (": not for " + ", ".join(wrong) if wrong else "") + "."))
     short = [f"{r['name']} ({r['rate'] / r['asked']:.2f} of it)" for r in known["rates"] if r["rate"] < r["asked"]]
     text = f"The rate that is asked for is reached in {len(known['rates']) - len(short)} of {len(known['rates'])} scenes"
