@@ -72,10 +72,14 @@ Rows Scene::plan() const {
                                        : "image, too even to be sampled");
   needed("textures", count(d.objects, [](const auto& o) { return o.albedo != nullptr; }),
          "objects look an albedo up where a ray meets them", "no object has a painted albedo");
-  rows.emplace_back("scene.motion", "left out: nothing moves while the shutter is open");
+  rows.emplace_back("scene.motion",
+                    "left out: this renderer has no motion blur, a picture is one moment");
   const auto with = [&](const auto& has) {
     return count(leaves, [&](const auto& leaf) { return has(*leaf.surface.planned().process); });
   };
+  needed("time", with([](const GaussianProcess& p) { return p.time.has_value(); }),
+         "surfaces change with time: their realisations are drawn for its moment",
+         "no process changes with time");
   needed("tensors", with([](const GaussianProcess& p) { return p.anisotropy != nullptr; }),
          "surfaces look up length scales A(x)", "all length scales are the same everywhere");
   needed("sigma_lookups", with([](const GaussianProcess& p) {

@@ -14,9 +14,9 @@ def camera_rays(n, rng):
     return np.c_[rng.uniform(-0.7, 0.7, (n, 2)), np.full(n, 3.0)], np.tile([0.0, 0, -1.0], (n, 1))
 
 
-def bench_conditions():
+def bench_conditions(quick=False):
     rows = []
-    for points in (0, 1, 10, 100, 1000, 10_000):
+    for points in (0, 1, 10, 100) if quick else (0, 1, 10, 100, 1000, 10_000):
         for normals in (False, True):
             if points == 0 and normals:
                 continue
@@ -30,7 +30,7 @@ def bench_conditions():
             start = time.perf_counter()
             gp = gn.GaussianProcess(MEAN, SIGMA, KERNEL, conditions=conditions if points else None)
             solved = time.perf_counter() - start
-            n = 500 if points > 100 else 5000
+            n = 500 if points > 100 or quick else 5000
             begin = time.process_time()
             counters = gn.first_hits(gp, *camera_rays(n, rng), 10, threads=1)["counters"]
             spent = time.process_time() - begin
@@ -51,12 +51,13 @@ def bench_conditions():
     return rows
 
 
-def bench_memory():
+def bench_memory(quick=False):
     """Four bounces in a cave of the same process, per path."""
     cave = gn.GaussianProcess(-1 * MEAN, SIGMA, KERNEL, bounds=([-2] * 3, [2] * 3))
     rows = []
     for memory in ("none", "renewal", "renewal+", "global-1", "global-2", "global-4", "global"):
         n = 20_000 if memory in ("none", "renewal", "renewal+") else 500
+        n //= 10 if quick else 1
         directions = np.tile([0.0, 0, -1.0], (n, 1))
         begin = time.process_time()
         hits = gn.first_hits(cave, np.zeros((n, 3)), directions, 10, memory=memory, threads=1)

@@ -21,9 +21,9 @@ def two_spheres():
     ]
 
 
-def one_fit(method, certainty):
+def one_fit(method, certainty, resolution, realisations):
     bounds = ((-1.5, -0.499, -1.5), (1.5, 2.501, 1.5))
-    query = two_spheres(), "union", bounds, 128, 1000
+    query = two_spheres(), "union", bounds, resolution, realisations
     plan = gn.compose_and_fit_plan(*query, method=method, certainty=certainty)
     before = time.process_time()
     counters = gn.compose_and_fit(*query, method=method, certainty=certainty)["counters"]
@@ -39,11 +39,12 @@ def one_fit(method, certainty):
     }
 
 
-def bench_two_spheres():
+def bench_two_spheres(quick=False):
     """Every row in a process of its own, whose peak memory is the fit's: about 60 MB of it are the interpreter's."""
+    size = ("32", "100") if quick else ("128", "1000")
     rows = []
     for method, certainty in (("closed_form", 5.0), ("sample", 5.0), ("sample", np.inf)):
-        done = subprocess.run([sys.executable, __file__, method, str(certainty)], check=True, stdout=subprocess.PIPE)
+        done = subprocess.run([sys.executable, __file__, method, str(certainty), *size], check=True, stdout=subprocess.PIPE)
         rows.append(json.loads(done.stdout))
     return rows
 
@@ -53,7 +54,7 @@ def bench_against_clark(quick=False):
     exact deviation, against the number of realisations; and as a plot in out/bench/fit_against_clark.svg."""
     rng = np.random.default_rng(5)
     pairs = 40
-    counts = (50, 100, 200, 500, 1000) + (() if quick else (2000, 5000, 10_000))
+    counts = (50, 100, 200, 500) + (() if quick else (1000, 2000, 5000, 10_000))
     error = np.zeros((len(counts), 2))
     for correlation in (-0.6, 0.0, 0.3, 0.8, 1.0):
         mean, sigma = rng.normal(size=(2, pairs)), np.exp(rng.normal(-0.3, 0.7, size=(2, pairs)))
@@ -93,4 +94,4 @@ def plot_against_clark(n, error):
 
 
 if __name__ == "__main__":
-    print(json.dumps(one_fit(sys.argv[1], float(sys.argv[2]))))
+    print(json.dumps(one_fit(sys.argv[1], float(sys.argv[2]), *map(int, sys.argv[3:]))))

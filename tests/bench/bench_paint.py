@@ -60,7 +60,7 @@ def milliseconds(work, clock, between, repetitions=40):
     return 1e3 * best, result
 
 
-def bench_dab():
+def bench_dab(quick=False):
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         fields = gn.PaintedFields(sphere(folder), sigma=0.05, length_scale=0.2)
@@ -78,16 +78,16 @@ def bench_dab():
                     o, b = DISTURBERS[c][i % 2]
                     fields.apply(c, o, [(1, 0.01, 0)], radius=1.1 * RADIUS, strength=0.5, **b)
 
-                row[name], counts = milliseconds(dab, clock, disturb)
+                row[name], counts = milliseconds(dab, clock, disturb, 3 if quick else 40)
             rows.append(row | {"nodes": counts["nodes"], "leaves": counts["leaves"]})
     return rows
 
 
-def bench_stroke():
-    """200 dabs of 64³ voxels a tenth of their diameter apart, as a hand draws them: one call a dab. What the tool pays
+def bench_stroke(quick=False):
+    """200 dabs (quick: 40) of 64³ voxels a tenth of their diameter apart, as a hand draws them: one call a dab. What the tool pays
     beside it for each move of the mouse: the ray under the brush for hand and ring, and the overlay's values under it."""
     rows = []
-    angles = np.arange(200) * 0.2 * RADIUS
+    angles = np.arange(40 if quick else 200) * 0.2 * RADIUS
     with tempfile.TemporaryDirectory() as folder:
         path = sphere(folder)
         for channel, operation, brush in BRUSHES:
@@ -119,7 +119,7 @@ def bench_stroke():
                 {
                     "stroke": f"{channel} {operation}",
                     "open, s": opened,
-                    "200 dabs, s": seconds - shown,
+                    f"{len(angles)} dabs, s": seconds - shown,
                     "rays and overlay, s": shown,
                     "longest dab, ms": 1e3 * longest,
                     "bake, s": time.perf_counter() - baked,
@@ -140,7 +140,7 @@ addon.register()
 bpy.ops.mesh.primitive_uv_sphere_add()
 bpy.ops.gpis.make(resolution=48)
 bpy.ops.ed.undo_push(message="made")
-for stroke in range(25):
+for stroke in range({strokes}):
     angle = np.linspace(0, 3, 200)
     points = [{{"name": "", "location": (np.cos(a), np.sin(a), 0), "pressure": 1.0}} for a in angle]
     bpy.ops.gpis.paint_stroke("EXEC_DEFAULT", True, stroke=points, channel="DEVIATION", operation="SET", value=0.1,
@@ -155,14 +155,15 @@ print("RESULT", undo, redo, push, len(bpy.context.object.data.gpis_strokes), flu
 """
 
 
-def bench_undo():
-    """In the bpy module, 25 strokes of 200 dabs."""
-    script = UNDO.format(root=str(Path(__file__).parents[2]))
+def bench_undo(quick=False):
+    """In the bpy module, 25 strokes (quick: 5) of 200 dabs."""
+    strokes = 5 if quick else 25
+    script = UNDO.format(root=str(Path(__file__).parents[2]), strokes=strokes)
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     (line,) = (line for line in done.stdout.splitlines() if line.startswith("RESULT"))
     undo, redo, push, size = map(float, line.split()[1:])
     return {
-        "dabs": 5000,
+        "dabs": 200 * strokes,
         "undo, ms": 1e3 * undo,
         "redo, ms": 1e3 * redo,
         "undo step, ms": 1e3 * push,

@@ -79,9 +79,9 @@ def bench_yardstick():
     return {"exponentials_per_second": 2e7 / best}
 
 
-def bench_sphere():
+def bench_sphere(quick=False):
     """Unit sphere, squared exponential, l = .1, sigma = .05."""
-    n = 200_000
+    n = 10_000 if quick else 200_000
     rng = np.random.default_rng(1)
     bounds = ((-1.3, -1.3, -1.3), (1.3, 1.3, 1.3))
     gp = gn.GaussianProcess(gn.SphereField([0, 0, 0], 1), 0.05, gn.SquaredExponential(0.1), bounds=bounds)
@@ -90,20 +90,20 @@ def bench_sphere():
     directions = np.tile([0.0, 0.0, -1.0], (n, 1))
     rows = []
     for sampler in SAMPLERS:
-        rows += camera_and_secondary(gp, origins, directions, sampler, n, rng)
+        rows += camera_and_secondary(gp, origins, directions, sampler, n, rng, 2 if quick else 5)
         if "first_hits_per_second" in rows[-1]:
-            m = 400 if sampler in ("nystrom", "realisation") else 20_000
+            m = (400 if sampler in ("nystrom", "realisation") else 20_000) // (10 if quick else 1)
             missed = missed_roots(gp, origins[:m], directions[:m], 2.6, 5.4, 0.002, sampler=sampler, seed=9)
             rows[-2]["missed_roots"] = missed
     return rows
 
 
-def bench_bunny():
+def bench_bunny(quick=False):
     """bunny.vdb as published (deviation half of its grid, l = .5), seen from its camera."""
     path = SHARED / "bunny.vdb"
     if not path.exists():
         return {"sampler": "bunny.vdb is not beside this checkout"}
-    n = 50_000
+    n = 5_000 if quick else 50_000
     rng = np.random.default_rng(1)
     gp = gn.GaussianProcess(
         gn.VdbField(str(path), "mean"),
@@ -115,13 +115,13 @@ def bench_bunny():
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     rows = []
     for sampler in SAMPLERS:
-        rows += camera_and_secondary(gp, np.tile(eye, (n, 1)), directions, sampler, n, rng, repetitions=3)
+        rows += camera_and_secondary(gp, np.tile(eye, (n, 1)), directions, sampler, n, rng, 1 if quick else 3)
     return rows
 
 
-def bench_varying_lengths():
+def bench_varying_lengths(quick=False):
     """Planar mean with a tensor field A(x), what `auto` picks: the stated error of the correlation and the cost."""
-    rng, n = np.random.default_rng(1), 2000
+    rng, n = np.random.default_rng(1), 200 if quick else 2000
     direction = np.array([0.9, 0.1, -0.3])
     origins = np.column_stack([rng.uniform(-1.5, 0, n), rng.uniform(-1, 1, n), np.full(n, 1.5)])
     directions = np.tile(direction / np.linalg.norm(direction), (n, 1))
@@ -130,7 +130,7 @@ def bench_varying_lengths():
         for kernel in (gn.SquaredExponential(1), gn.Matern(1.5, 1)):
             bounds = ((-2, -2, -2), (8, 2, 2))
             gp = gn.GaussianProcess(gn.PlaneField([0, 0, 0], [0, 0, 1]), 0.3, kernel, anisotropy=field, bounds=bounds)
-            plan, (row, _) = gp.plan(), rate(gp, origins, directions, 3)
+            plan, (row, _) = gp.plan(), rate(gp, origins, directions, 1 if quick else 3)
             about = {"field": name, "kernel": repr(kernel), "sampler": plan["sampler"].split(":")[0]}
             rows.append(about | {"correlation_error": float(plan["correlation_error"])} | row)
     return rows

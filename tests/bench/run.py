@@ -16,6 +16,7 @@ import time
 from pathlib import Path
 
 import gpis_native as gn
+from error.runner import processor_seconds
 
 HERE = Path(__file__).parent
 OUT = HERE.parents[1] / "out" / "bench"
@@ -53,11 +54,12 @@ def main(arguments):
     for name, function in discover():
         if wanted and not any(part in name for part in wanted):
             continue
-        start = time.perf_counter()
+        print(f"{name} ...", file=sys.stderr, flush=True)
+        start, spent = time.perf_counter(), processor_seconds()
         taken = inspect.signature(function).parameters
         rows = function(**{name: on for name, on in options.items() if name in taken})
         rows = [rows] if isinstance(rows, dict) else rows
-        print(f"{name} ({time.perf_counter() - start:.1f} s)")
+        print(f"{name} ({time.perf_counter() - start:.1f} s, {processor_seconds() - spent:.1f} s of the processor)", flush=True)
         print_table(rows)
         results["benchmarks"][name] = rows
     if not results["benchmarks"]:

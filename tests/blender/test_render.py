@@ -135,7 +135,7 @@ def test_statistics_beside_the_image_and_by_operator(stage, tmp_path):
     support.picture(stage, tmp_path)
     entry = json.loads((tmp_path / "GPIS-0.json").read_text())
     assert entry["stop"] == "samples" and [row["samples"] for row in entry["history"]] == [16, 32]
-    assert entry["history"][-1]["estimated_error"] > 0 and entry["stats"] and entry["plan"]
+    assert entry["history"][-1]["estimated_error"] == entry["stats"]["estimated_error"] > 0 and entry["plan"]
     bpy.ops.gpis.save_statistics(filepath=str(tmp_path / "saved.json"))
     assert json.loads((tmp_path / "saved.json").read_text()) == entry
 

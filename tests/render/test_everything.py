@@ -25,7 +25,7 @@ def everything(folder, *, furnace=False):
     conditions = {"points": [(0, 0, 1.0), (0.6, 0, 0.8)], "values": [0.05, np.nan], "normals": [(np.nan,) * 3, (0.6, 0, 0.8)]}
     bodies = {
         "Vdb": (of_vdb, ["Lambert"], at(-2, 1)),
-        "Mirror": (ball(), ["Mirror"], at(0, 1)),
+        "Mirror": (ball(time_scale=1.0, time=0.3), ["Mirror"], at(0, 1)),
         "Glass": (ball(), ["Glass"], at(2, 1)),
         "Combed": (combed(), ["Conductor"], at(-2, -1)),
         "Conditions": (ball(conditions=conditions), ["Lambert"], at(0, -1)),
@@ -93,7 +93,7 @@ def test_the_plan_names_what_is_left_out_and_what_is_not(tmp_path):
     assert plan["scene.embree"] == "1 mesh objects" and plan["scene.processes"] == "7 stochastic surfaces"
     assert plan["scene.csg"].startswith("1 objects") and plan["scene.tensors"].startswith("1 surfaces")
     assert plan["scene.sigma_lookups"].startswith("2 surfaces") and plan["scene.conditions"].startswith("1 surfaces")
-    assert plan["scene.textures"].startswith("1 objects")
+    assert plan["scene.textures"].startswith("1 objects") and plan["scene.time"].startswith("1 surfaces change")
     assert plan["objects[0].mesh of 'Sheet'"] == "1 triangles" and plan["objects[0].materials of 'Sheet'"] == "Body"
     assert plan["objects[1].mean of 'Vdb'"].startswith("varies") and plan["objects[1].sigma of 'Vdb'"].startswith("varies")
     assert plan["objects[2].sigma of 'Mirror'"] == "constant 0.05" and "length_scales" in str(plan)
@@ -109,7 +109,7 @@ def test_the_plan_names_what_is_left_out_and_what_is_not(tmp_path):
     assert left_out(bare) == {
         f"scene.{part}"
         for part in (
-            "embree", "processes", "light_sampling", "inside", "textures", "motion", "tensors", "sigma_lookups",
-            "conditions", "csg",
+            "embree", "processes", "light_sampling", "inside", "textures", "motion", "time", "tensors",
+            "sigma_lookups", "conditions", "csg",
         )
     }  # fmt: skip

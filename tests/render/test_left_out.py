@@ -30,6 +30,19 @@ def test_what_is_left_out_is_not_entered(counter, seed):
     assert {row: stats[row] for row in ROWS if row != counter and stats[row]} == {}
 
 
+def test_time_is_not_entered_where_nothing_changes_with_it(seed):
+    """Paths drawn anew have no use for a time: not one counter moves. A realisation at rest draws a number for every node
+    of its noise; one that flows draws those of 16 moments around it (process/lattice_noise.h)."""
+    moving = ball(time_scale=1.0, time=0.25)
+    assert counted(scene(moving), seed) == counted(scene(), seed)
+    rest, flowing = (
+        gn.render(gn.Scene(scene(process)), 8, 8, samples=16, seed=seed, memory="global", threads=1).stats
+        for process in (ball(), moving)
+    )
+    ratio = (flowing["line_normals"] / flowing["line_segments"]) / (rest["line_normals"] / rest["line_segments"])
+    assert 13 < ratio < 19  # other realisations, other paths: the nodes near a ray are not the same number
+
+
 def test_embree_is_not_opened_without_meshes():
     """In a process of its own: a library once opened stays."""
     code = (

@@ -36,7 +36,7 @@ class Effort:
 
 
 FULL = Effort("full", 24, 12, 5.0, 200.0, 128, 6, 30)
-QUICK = Effort("quick", 16, 6, 0.4, 6.0, 32, 3, 12)
+QUICK = Effort("quick", 16, 4, 0.4, 6.0, 32, 3, 12)
 SLOW = ("painted", "everything")
 
 

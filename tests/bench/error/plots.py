@@ -22,8 +22,10 @@ STYLE = {
 }  # fmt: skip
 
 
-def svg(figure):
+def svg(figure, png=None):
     out = io.StringIO()
+    if png:
+        figure.savefig(png, dpi=110, bbox_inches="tight")
     figure.savefig(out, format="svg", bbox_inches="tight", metadata={"Date": None})
     plt.close(figure)
     return out.getvalue()[out.getvalue().index("<svg") :]
@@ -99,7 +101,7 @@ def bias_panel(axes, rows, title):
     axes.set_title(title, loc="left")
 
 
-def scene_plot(samplers, approximations, paper=None):
+def scene_plot(samplers, approximations, paper=None, png=None):
     """samplers, approximations: lists of (key, title, evaluation); a column for each that is not empty."""
     with plt.rc_context(STYLE):
         panels = 1 + bool(approximations)
@@ -110,10 +112,10 @@ def scene_plot(samplers, approximations, paper=None):
             error_panel(axes[0, 1], approximations, "Approximations, against memory global")
         bias_panel(axes[0, -1], samplers + approximations, "Bias")
         figure.tight_layout()
-        return svg(figure)
+        return svg(figure, png)
 
 
-def calibration_plot(rows):
+def calibration_plot(rows, png=None):
     """rows: (title, samples, ratio, standard error)."""
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(figsize=(8.2, 3))
@@ -121,14 +123,17 @@ def calibration_plot(rows):
         axes.axhline(1, color="#888888", lw=0.8)
         for i, (title, samples, ratio, error) in enumerate(rows):
             shift = 1.025 ** (i - len(rows) / 2)
-            axes.errorbar(np.array(samples) * shift, ratio, yerr=2 * np.array(error), marker="o", ms=3.5, lw=1, label=title)
+            axes.errorbar(
+                np.array(samples) * shift, ratio, yerr=2 * np.array(error), marker="o", ms=3.5, lw=1, label=title,
+                color=f"C{i}" if i < 10 else "black",
+            )  # fmt: skip
         axes.set_xscale("log", base=2)
         axes.set_xticks(sorted({n for row in rows for n in row[1]}))
         axes.xaxis.set_major_formatter(matplotlib.ticker.FuncFormatter(lambda v, _: f"{v:g}"))
         axes.set_xlabel("samples per pixel")
         axes.set_ylabel("estimated / true error")
         axes.legend(fontsize=7.5, loc="center left", bbox_to_anchor=(1.01, 0.5))
-        return svg(figure)
+        return svg(figure, png)
 
 
 def rates_plot(rows):

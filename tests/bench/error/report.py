@@ -25,8 +25,9 @@ HOW_TO_READ = """<h2>How to read the plots</h2><p>Points are the error with two 
 the part of it that is variance, a dotted line the floor that the bias leaves. Dashed grey: slope −1/2. An approximation's
 reference is memory <i>global</i>, one realisation for the whole path; no other sampler draws that, so it has other seeds only.
 A bias floor is named where the squared bias is more than three standard errors from 0. The paper's dense sampler (8 points
-a segment at correlation .9, or 32) cannot be expressed here: this dense sampler draws values and slopes jointly and loses no
-root. Its renderer stands in the first plot by its measured rate, with the variance of this dense sampler.</p>"""
+a segment at correlation .9, or 32) cannot be asked of this one, which draws values and slopes jointly and loses no root; what
+its points lose is in <i>./dev bench published</i> and the docs. Its renderer stands in the first plot by its measured rate,
+with the variance of this dense sampler.</p>"""
 
 
 def number(value, digits=3):
@@ -69,9 +70,9 @@ def unbiased(row):
 
 
 def slope_verdict(row):
-    """True: -1/2 or steeper within two standard errors; None: too few budgets to tell, or biased."""
+    """True: -1/2 or steeper within two standard errors; None: too few budgets or repeats to tell, or biased."""
     found = row["found"]
-    if found["slope"] is None or not unbiased(row):
+    if found["slope"] is None or row["cell"]["repeats"] < 6 or not unbiased(row):
         return None
     return found["slope"] - 2 * found["slope_error"] <= -0.5
 
@@ -102,11 +103,13 @@ def findings(known):
     wrong, count = [], 0
     for found in known["scenes"]:
         if found["calibration"] and not found["scene"].heavy_tails:
-            for samples, ratio in zip(found["calibration"]["samples"], found["calibration"]["ratio"], strict=True):
+            for samples, ratio, error in zip(*(found["calibration"][k] for k in ("samples", "ratio", "error")), strict=True):
                 count += 1
-                if not CALIBRATED[0] <= ratio <= CALIBRATED[1]:
+                slack = 2 * error if known["effort"] == "quick" else 0  # of few seeds and pixels
+                if not CALIBRATED[0] - slack <= ratio <= CALIBRATED[1] + slack:
                     wrong.append(f"{found['scene'].title} at {samples} samples ({ratio:.2f})")
-    text = f"Estimated error over true error lies in [{CALIBRATED[0]}, {CALIBRATED[1]}] in {count - len(wrong)} of {count} cases"
+    within = " (within two standard errors)" if known["effort"] == "quick" else ""
+    text = f"Estimated over true error lies in [{CALIBRATED[0]}, {CALIBRATED[1]}]{within} in {count - len(wrong)} of {count} cases"
     lines.append(mark(not wrong, text + (": not for " + ", ".join(wrong) if wrong else "") + "."))
     short = [f"{r['name']} ({r['rate'] / r['asked']:.2f} of it)" for r in known["rates"] if r["rate"] < r["asked"]]
     text = f"The rate that is asked for is reached in {len(known['rates']) - len(short)} of {len(known['rates'])} scenes"
@@ -181,11 +184,11 @@ def counts_table(found):
     return table(columns, body)
 
 
-def scene_section(known, found):
+def scene_section(known, found, pictures):
     scene = found["scene"]
     there = [r for r in found["rows"] if "found" in r]
     groups = [[(r["key"], r["title"], r["found"]) for r in there if r["group"] == g] for g in ("sampler", "truth")]
-    plot = plots.scene_plot(*groups, paper_points(known, found)) if there else ""
+    plot = plots.scene_plot(*groups, paper_points(known, found), pictures / f"{scene.name}.png") if there else ""
     head = f'<div class="head"><img src="{plots.picture(found["picture"])}" alt=""><div><h2>{html.escape(scene.title)}</h2>'
     head += f"<div>{html.escape(scene.what)}</div></div></div>"
     return f"{head}{plot}{main_table(found)}<details><summary>Operations, memory</summary>{counts_table(found)}</details>"
@@ -217,9 +220,9 @@ def rates_section(known):
     return text
 
 
-def calibration_section(known):
+def calibration_section(known, pictures):
     rows = [
-        (f["scene"].title, f["calibration"]["samples"], f["calibration"]["ratio"], f["calibration"]["error"])
+        (f["scene"].title + ", not judged" * f["scene"].heavy_tails, *(f["calibration"][k] for k in ("samples", "ratio", "error")))
         for f in known["scenes"]
         if f["calibration"]
     ]
@@ -227,7 +230,8 @@ def calibration_section(known):
         return ""
     repeats = max(r["cell"]["repeats"] for f in known["scenes"] for r in f["rows"] if r["key"] == "default" and "found" in r)
     text = f"<h2>Is the estimated error the error?</h2><p class=note>Mean over {repeats} seeds of the film's estimated relMSE, divided "
-    text += "by the true one against the reference, with two standard errors. Green: what is asked.</p>" + plots.calibration_plot(rows)
+    text += "by the true one against the reference, with two standard errors. Green: what is asked, where a "
+    text += "sample has a finite kurtosis.</p>" + plots.calibration_plot(rows, pictures / "calibration.png")
     columns = sorted({n for row in rows for n in row[1]})
     body = []
     for title, samples, ratio, error in rows:
@@ -253,7 +257,21 @@ def comparison_section(known):
     return text + table(["cell", "paths per second", "1 / (variance × seconds)"], rows)
 
 
+def left_out_section(known):
+    if known["effort"] != "quick":
+        return ""
+    return (
+        "<p><b>A quick run leaves out</b> the memory models, whole paths on one realisation and the mean surfaces (their "
+        "references are slow), and has pictures of 16 × 16 pixels (4 × 4 of slow scenes), at most 32 samples a pixel, 12 seeds for "
+        "the default and 3 for others, where a full run has 24 × 24, 128, 30 and 6. Every reference still has 100 times the "
+        "samples. It tells a sampler that has become slow or wrong by several per cent, not a bias of some thousandths.</p>"
+    )
+
+
 def write(known, path):
+    """The page, and beside it `pictures`: its plots as .png, for the docs."""
+    pictures = path.parent / "pictures"
+    pictures.mkdir(parents=True, exist_ok=True)
     style = f"<style>{STYLE}</style>"
     text = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>GPIS: error against run time</title>{style}'
     text += "<h1>Error against run time</h1>"
@@ -262,10 +280,9 @@ def write(known, path):
     text += "one core. Error is relMSE, mean of (pixel − reference)² / (reference² + .01) on luminance, the reference's own "
     least = min(r["reference"]["samples"] / r["cell"]["samples"][-1] for _, r in measured(known)) if measured(known) else 0
     text += f"noise taken off. References have at least {least:.0f} times the samples, of another sampler where there is one.</p>"
-    text += "<h2>What is found</h2>" + findings(known)
-    text += rates_section(known) + calibration_section(known)
-    text += "".join(scene_section(known, found) for found in known["scenes"])
+    text += left_out_section(known) + "<h2>What is found</h2>" + findings(known)
+    text += rates_section(known) + calibration_section(known, pictures)
+    text += "".join(scene_section(known, found, pictures) for found in known["scenes"])
     text += HOW_TO_READ
     text += comparison_section(known) + "</html>\n"
-    path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text)

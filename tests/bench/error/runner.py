@@ -5,6 +5,7 @@ import hashlib
 import json
 import os
 import platform
+import resource
 import sys
 import time
 from pathlib import Path
@@ -23,16 +24,24 @@ OUT = Path(__file__).parents[3] / "out" / "bench" / "error"
 REFERENCE_WEIGHT = 3  # of the bar, over a cell's
 
 
+def processor_seconds():
+    """Of this process, its threads and the cells' processes: what other programs do on the machine counts little."""
+    parts = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(part.ru_utime + part.ru_stime for part in parts)
+
+
 class Bar:
-    """One line on the terminal: how far, how long, what."""
+    """One line on the terminal: how far, how long by the clock and of the processor, what."""
 
     def __init__(self, total):
         self.total, self.done, self.start, self.shown = total, 0.0, time.monotonic(), ""
+        self.processor = processor_seconds()
 
     def show(self, what, part=0.0):
         fraction = min((self.done + part) / self.total, 1.0)
         passed = time.monotonic() - self.start
-        self.shown = f"[{'#' * int(30 * fraction):<30}] {100 * fraction:3.0f} %  {passed:5.0f} s  {what}"
+        spent = processor_seconds() - self.processor
+        self.shown = f"[{'#' * int(30 * fraction):<30}] {100 * fraction:3.0f} %  {passed:5.0f} s ({spent:.0f} s CPU)  {what}"
         if sys.stderr.isatty():
             print(f"\r{self.shown:<110}"[:110], end="", file=sys.stderr, flush=True)
 

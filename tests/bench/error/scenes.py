@@ -72,6 +72,12 @@ def smooth_sphere(material, world):
     return lambda folder: standard_sphere(material, world, sigma=0.0)()
 
 
+def under_a_small_sun(sampler="auto", memory="renewal+", folder=None):
+    """Mirrors and a light of half a degree in a dark sky: most samples see nothing, few see much."""
+    sun = {"name": "Sun", "type": "sun", "matrix": look_at((2, 3, 3), (0, 0, 0)), "color": (1, 1, 1), "power": 3.0, "angle": 0.0093}
+    return standard_sphere(MIRROR, {"color": (0, 0, 0)})(sampler, memory, folder) | {"lights": [sun]}
+
+
 LAMBERT = {"type": "lambert", "color": (0.8, 0.8, 0.8)}
 MIRROR = {"type": "mirror", "color": (0.9, 0.9, 0.9)}
 
@@ -249,6 +255,10 @@ SCENES = [
         "sphere_mirror", "Standard sphere, mirror", "the same with mirrors of albedo .9 under a gradient sky",
         standard_sphere(MIRROR, SKY), "convolution", "dense", methods=True, memories=True,
         microfacet=smooth_sphere(beckmann_like(STANDARD_SIGMA, STANDARD_LENGTH), SKY),
+    ),
+    BenchScene(
+        "small_sun", "Mirrors under a small sun", "the mirror sphere in a dark sky with a sun of half a degree",
+        under_a_small_sun, "convolution", "dense", heavy_tails=True,
     ),
     BenchScene(
         "bunny", "bunny.vdb", "mean and σ on a grid, SE ℓ .5, green mirror, white sky, as published",
