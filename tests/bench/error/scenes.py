@@ -277,7 +277,7 @@ SCENES = [
     ),
     BenchScene(
         "dilute", "Dilute medium", "constant mean 1.5 σ, Matérn 5/2 of ℓ .25, Lambert, gradient sky",
-        dilute_medium, "markov", "dense", methods=True,
+        dilute_medium, "first_passage", "dense", methods=True,
     ),
     BenchScene("cornell", "Cornell box", "meshes and an area lamp alone: nothing stochastic", cornell, "", ""),
     BenchScene("everything", "All at once", "room, lamp, sky, painted object, CSG, medium", everything, "", "dense"),
