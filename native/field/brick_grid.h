@@ -39,16 +39,18 @@ class BrickGrid {
   const Brick& brick_of(const Index3& cell) const { return brick(brick_index(cell)); }
   // Of the brick that holds a cell: the same in all grids of the same nodes.
   std::size_t brick_index(const Index3& cell) const {
-    return (static_cast<std::size_t>(cell[0] / kCells) * bricks_along_[1] + cell[1] / kCells) *
+    const unsigned i = cell[0], j = cell[1], k = cell[2];  // division by 8 is then a shift
+    return (static_cast<std::size_t>(i / kCells) * bricks_along_[1] + j / kCells) *
                bricks_along_[2] +
-           cell[2] / kCells;
+           k / kCells;
   }
   const Brick& brick(std::size_t index) const { return bricks_[index]; }
   // The first corner of a cell in a brick that is not constant; corner 4i + 2j + k is at
   // corner_offset(i, j), and one further for k.
   const float* first_corner(const Brick& brick, const Index3& cell) const {
-    return values_.data() + brick.values +
-           ((cell[0] % kCells) * kNodes + cell[1] % kCells) * kNodes + cell[2] % kCells;
+    const unsigned i = cell[0], j = cell[1], k = cell[2];
+    return values_.data() + brick.values + ((i % kCells) * kNodes + j % kCells) * kNodes +
+           k % kCells;
   }
   static constexpr int corner_offset(int i, int j) { return (i * kNodes + j) * kNodes; }
   void corners(const Brick& brick, const Index3& cell, float out[8]) const {

@@ -37,6 +37,14 @@ std::shared_ptr<const GridField> GridField::scaled(double factor) const {
   return out;
 }
 
+std::shared_ptr<const GridField> GridField::moved(const Vec3& stretch, const Vec3& shift) const {
+  auto out = std::make_shared<GridField>(*this);
+  out->voxel_size_ = voxel_size_ * stretch;
+  out->origin_ = origin_ * stretch + shift;
+  out->lipschitz_ = std::abs(factor_) * grid_->lipschitz(out->voxel_size_);
+  return out;
+}
+
 bool GridField::same_lattice(const GridField& other) const {
   for (int i = 0; i < 3; ++i)
     if (grid_->nodes()[i] != other.grid_->nodes()[i] || voxel_size_[i] != other.voxel_size_[i] ||

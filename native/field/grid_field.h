@@ -19,6 +19,8 @@ class GridField final : public Field {
             std::optional<double> background);
   // The same nodes, their values times a number.
   std::shared_ptr<const GridField> scaled(double factor) const;
+  // The same grid, its node at x now at stretch·x + shift; every stretch is positive.
+  std::shared_ptr<const GridField> moved(const Vec3& stretch, const Vec3& shift) const;
 
   double value(const Vec3& p) const override;
   FieldSample sample(const Vec3& p) const override;
@@ -140,6 +142,8 @@ class GridField::Line final : public FieldLine {
     // The cell that was located last, in nearly all cases.
     const Vec3 x = at(middle_);
     const Step& step = located();
+    slope_ = direction_;
+    constant_ = true;
     if (a == step.at && b <= step.exit && a >= box_in_ && b <= box_out_) {
       // Number by number: whole structs would wait for the stores of their parts.
       for (int i = 0; i < 3; ++i) {
@@ -150,15 +154,13 @@ class GridField::Line final : public FieldLine {
       }
     } else {
       place_ = field_->place(x);
+      if (field_->background_ && place_.any_outside()) return set_constant(*field_->background_);
+      for (int i = 0; i < 3; ++i)
+        if (place_.outside[i]) slope_[i] = 0;
     }
-    constant_ = true;
-    if (field_->background_ && place_.any_outside()) return set_constant(*field_->background_);
     const BrickGrid::Brick& brick = field_->grid_->brick_of(place_.cell);
     if (brick.values < 0) return set_constant(field_->factor_ * brick.min);
     constant_ = false;
-    slope_ = direction_;
-    for (int i = 0; i < 3; ++i)
-      if (place_.outside[i]) slope_[i] = 0;
     // Linear in s along x, quadratic with y, for the two corners along z at once; cubic with z.
     using Pair = Eigen::Array2d;
     const float* first = field_->grid_->first_corner(brick, place_.cell);

@@ -1,6 +1,7 @@
 #include "field/transformed_field.h"
 
 #include "field/check.h"
+#include "field/constant_field.h"
 #include "field/grid_field.h"
 
 namespace gpis {
@@ -12,6 +13,10 @@ bool keeps_axes(const Mat3& m) {
   for (const Vec3& row : m.row)
     for (int i = 0; i < 3; ++i) entries += row[i] != 0;
   return entries == 3;
+}
+
+bool stretches_axes(const Mat3& m) {
+  return keeps_axes(m) && m.row[0].x > 0 && m.row[1].y > 0 && m.row[2].z > 0;
 }
 
 }  // namespace
@@ -34,6 +39,15 @@ TransformedField::TransformedField(FieldPtr field, const Affine& matrix)
       support_->include(matrix.point(p));
     }
   }
+}
+
+FieldPtr transformed(FieldPtr field, const Affine& matrix) {
+  check_transform(matrix);
+  if (dynamic_cast<const ConstantField*>(field.get())) return field;
+  const Mat3& m = matrix.linear;
+  if (const auto* grid = dynamic_cast<const GridField*>(field.get()); grid && stretches_axes(m))
+    return grid->moved({m.row[0].x, m.row[1].y, m.row[2].z}, matrix.translation);
+  return std::make_shared<TransformedField>(std::move(field), matrix);
 }
 
 }  // namespace gpis

@@ -58,4 +58,8 @@ class TransformedField final : public Field {
   std::optional<Box3> support_;
 };
 
+// A field moved by an affine map, as the simplest field that is that: constants stay what they are,
+// grids that are moved and stretched along their axes are grids, whose lines marches know.
+FieldPtr transformed(FieldPtr field, const Affine& matrix);
+
 }  // namespace gpis

@@ -1,7 +1,6 @@
 #include "process/transformed.h"
 
 #include "field/check.h"
-#include "field/constant_field.h"
 #include "field/transformed_field.h"
 #include "field/transformed_tensor_field.h"
 #include "kernel/transformed_kernel.h"
@@ -9,11 +8,6 @@
 
 namespace gpis {
 namespace {
-
-FieldPtr moved(const FieldPtr& field, const Affine& matrix) {
-  if (std::dynamic_pointer_cast<const ConstantField>(field)) return field;  // marches know it
-  return std::make_shared<TransformedField>(field, matrix);
-}
 
 bool is_identity(const Mat3& m) {
   for (int i = 0; i < 3; ++i)
@@ -27,8 +21,8 @@ bool is_identity(const Mat3& m) {
 std::shared_ptr<GaussianProcess> transformed(const GaussianProcess& process, const Affine& matrix) {
   const double least_stretch = check_transform(matrix).min;
   auto out = std::make_shared<GaussianProcess>(process);
-  out->mean = moved(process.mean, matrix);
-  out->sigma = moved(process.sigma, matrix);
+  out->mean = transformed(process.mean, matrix);
+  out->sigma = transformed(process.sigma, matrix);
   if (process.anisotropy) {
     // The kernel is a factor on it.
     out->anisotropy = std::make_shared<TransformedTensorField>(process.anisotropy, matrix);

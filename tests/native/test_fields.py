@@ -90,6 +90,15 @@ def test_a_grid_is_its_background_outside():
     assert grid(background=5.0).range[1] == 5.0
 
 
+def test_a_grid_that_moves_along_its_axes_is_the_grid_that_stands_there():
+    scale, shift, x = np.array([0.5, 1.25, 2]), np.array([0.3, -0.1, 0.2]), points()
+    matrix = np.diag([*scale, 1])
+    matrix[:3, 3] = shift
+    process = gn.GaussianProcess(-2 * grid(background=5.0), 0.1, gn.SquaredExponential(0.5)).transformed(matrix)
+    there = -2 * gn.GridField(VALUES, VOXEL * scale, ORIGIN * scale + shift, background=5.0)
+    assert np.array_equal(process.mean(x), there(x))
+
+
 @pytest.mark.parametrize("name", FIELDS)
 def test_gradients_are_derivatives_and_bounds_hold(name):
     field, x, h = FIELDS[name], points(), 1e-6
