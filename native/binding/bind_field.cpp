@@ -199,7 +199,7 @@ field(points (N, 3)) -> (N,); field.gradient(points) -> (N, 3). Fields add to fi
       .def(
           "transformed",
           [](const SharedField& f, const Array& matrix) -> SharedField {
-            return std::make_shared<TransformedField>(f, affine_argument(matrix));
+            return std::const_pointer_cast<Field>(transformed(f, affine_argument(matrix)));
           },
           "matrix"_a,
           "The field moved by an affine matrix (4, 4): its value at x is the field's at matrix⁻¹ "
