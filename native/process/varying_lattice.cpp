@@ -31,8 +31,8 @@ void VaryingLattice::check(const TensorField& a, const Box3& bounds) {
 
 VaryingLattice::View VaryingLattice::window(LatticeNoise& noise, SmoothedNoise& smoothed,
                                             const Ellipsoid& e) {
-  if (e.level >= static_cast<int>(windows_.size())) windows_.resize(e.level + 1);
-  Window& w = windows_[e.level];
+  if (e.level + 1 >= static_cast<int>(windows_.size())) windows_.resize(e.level + 2);
+  Window& w = windows_[e.level + 1];
   bool within = w.generation == noise.generation();
   for (int a = 0; a < 3; ++a)
     within &= w.first[a] <= e.first[a] && e.first[a] + e.size[a] <= w.first[a] + w.size[a];
@@ -42,7 +42,13 @@ VaryingLattice::View VaryingLattice::window(LatticeNoise& noise, SmoothedNoise& 
       w.size[a] = e.size[a] + 2 * kMargin;
     }
     w.noise.resize(static_cast<std::size_t>(w.size[0]) * w.size[1] * w.size[2]);
-    smoothed.window(noise, white_, e.level, w.first, w.size, w.noise.data());
+    if (e.level < 0) {
+      normals_.resize(w.noise.size());
+      noise.window(white_.number, 0, w.first, w.size, normals_.data());
+      std::copy(normals_.begin(), normals_.end(), w.noise.begin());
+    } else {
+      smoothed.window(noise, white_, e.level, w.first, w.size, w.noise.data());
+    }
     w.generation = noise.generation();
   }
   const std::ptrdiff_t row = w.size[0], slice = row * w.size[1];
@@ -53,15 +59,15 @@ VaryingLattice::View VaryingLattice::window(LatticeNoise& noise, SmoothedNoise& 
 
 // The coarsest level with T >= 2S along every axis, T = A/2; level 0 anywhere.
 VaryingLattice::Ellipsoid::Ellipsoid(const SymMat3& a, const SmoothedNoise::White& white,
-                                     const Vec3& x)
-    : level(0) {
+                                     const Vec3& x, bool smoothed)
+    : level(smoothed ? 0 : -1) {
   const auto serves = [&](int next) {
     const SymMat3 rest = a - SymMat3::identity(4 * SmoothedNoise::variance(white, next));
     return rest.xx > 0 && Cholesky3(rest).positive;
   };
-  while (serves(level + 1)) ++level;
-  h = SmoothedNoise::spacing(white, level);
-  const SymMat3 m = a - SymMat3::identity(2 * SmoothedNoise::variance(white, level));
+  while (smoothed && serves(level + 1)) ++level;
+  h = smoothed ? SmoothedNoise::spacing(white, level) : white.spacing;
+  const SymMat3 m = smoothed ? a - SymMat3::identity(2 * SmoothedNoise::variance(white, level)) : a;
   const Cholesky3 of_a(a), of_m(m);
   inverse_a = of_a.inverse();
   p = of_m.inverse();
@@ -72,7 +78,7 @@ VaryingLattice::Ellipsoid::Ellipsoid(const SymMat3& a, const SmoothedNoise::Whit
                                   first[axis] + 1);
   }
   scale = std::pow(2 / kPi, 0.75) * std::pow(of_a.determinant(), 0.25) /
-          std::sqrt(of_m.determinant()) * (h * h * h);
+          std::sqrt(of_m.determinant()) * (smoothed ? h * h * h : std::pow(h, 1.5));
 }
 
 // On a row the weights are a Gaussian about u* = -b: exp(-least - p.xx (u + b)²).
@@ -106,7 +112,7 @@ void VaryingLattice::rows(const Ellipsoid& e, const Vec3& x, const View& view, c
 // (up to e^70, times as little; nodes up to the next four are there: kMargin).
 double VaryingLattice::value(LatticeNoise& noise, SmoothedNoise& smoothed, const Vec3& x) {
   using Four = Eigen::Array<float, 4, 1>;
-  const Ellipsoid e(a_->value(x) * length2_, white_, x);
+  const Ellipsoid e(a_->value(x) * length2_, white_, x, true);
   const View view = window(noise, smoothed, e);
   const double h = e.h, rate = e.p.xx * h * h;
   gauss_.resize(e.size[0] + 4);
@@ -145,7 +151,7 @@ double VaryingLattice::value(LatticeNoise& noise, SmoothedNoise& smoothed, const
 
 FieldSample VaryingLattice::sample(LatticeNoise& noise, SmoothedNoise& smoothed, const Vec3& x) {
   const TensorSample at = a_->sample(x);
-  const Ellipsoid e(at.value * length2_, white_, x);
+  const Ellipsoid e(at.value * length2_, white_, x, false);
   const View view = window(noise, smoothed, e);
 
   // Σ w ξ, Σ w ξ u, Σ w ξ u uᵀ, row by row; the weights follow from two exponentials.

@@ -1,8 +1,8 @@
 // The squared exponential under a field A(x) of squared length scales, with exactly the covariance
 // of Paciorek and Schervish (formulas C11): g(x) = Σ_j φ_{A(x)}(x - s_j) ξ_j h^{3/2},
 //   φ_A(u) = (2/π)^¾ |A|^{-¼} exp(-uᵀA⁻¹u),
-// on one lattice of spacing h = ½ √(smallest eigenvalue of A anywhere). A point takes that noise
-// smoothed, W_S, on nodes as far apart as its own smallest eigenvalue allows: with M = A(x) - 2S
+// on one lattice of spacing h = ½ √(smallest eigenvalue of A anywhere). `value` takes that noise
+// smoothed, W_S, on nodes as far apart as the smallest eigenvalue at x allows: with M = A(x) - 2S
 //   g(x) = (2/π)^¾ |A|^¼ |M|^{-½} H³ Σ_n exp(-uᵀM⁻¹u) W_S(s_n).
 #pragma once
 
@@ -24,8 +24,9 @@ class VaryingLattice {
   static constexpr double kMostRatio = 8;
   static void check(const TensorField& a, const Box3& bounds);
 
+  // From the white noise itself: a few points of a realisation do not pay for smoothing it.
   FieldSample sample(LatticeNoise& noise, SmoothedNoise& smoothed, const Vec3& x);
-  // Alone, at a fraction of the cost.
+  // Alone, of many points: from smoothed noise.
   double value(LatticeNoise& noise, SmoothedNoise& smoothed, const Vec3& x);
   // A bound of the variance of the fourth derivative along d.
   double fourth_derivative_variance(const Vec3& d) const;
@@ -33,8 +34,8 @@ class VaryingLattice {
  private:
   // The nodes in reach of x, those s with uᵀM⁻¹u below a bound, u = s - x: the box about them.
   struct Ellipsoid {
-    Ellipsoid(const SymMat3& a, const SmoothedNoise::White& white, const Vec3& x);
-    int level;
+    Ellipsoid(const SymMat3& a, const SmoothedNoise::White& white, const Vec3& x, bool smoothed);
+    int level;  // -1: the white noise itself
     double h;
     SymMat3 inverse_a, p;  // p = M⁻¹
     Node first;
@@ -67,7 +68,8 @@ class VaryingLattice {
   TensorFieldPtr a_;
   double length2_;
   SmoothedNoise::White white_;
-  std::vector<Window> windows_;  // by level
+  std::vector<Window> windows_;  // by level + 1
+  std::vector<double> normals_;
   // Of `value`: of a row's nodes; of rows, the logarithms of two factors.
   std::vector<float> gauss_;
   std::vector<Row> rows_;

@@ -1,8 +1,8 @@
 // Realisations in all of space. Under length scales that vary: their values are Σ w_j(x) ξ_j with
 // the weights of formulas C11, written here a second time: Σ_j w_j(x) w_j(y) is the covariance of
-// Paciorek and Schervish. The code takes the noise smoothed, from coarser lattices: where it is off
-// by d from these sums, its covariance is by 2d at most. And lines through a realisation are that
-// realisation, whatever the kernel.
+// Paciorek and Schervish. Rows of a grid take the noise smoothed, from coarser lattices: where they
+// are off by d from these sums, their covariance is by 2d at most. And lines through a realisation
+// are that realisation, whatever the kernel.
 #include "check.h"
 #include "core/symmetric_eigen.h"
 #include "field/constant_field.h"
@@ -150,7 +150,7 @@ TEST(realisations_under_varying_lengths_have_their_covariance) {
   test::context().clear();
 }
 
-// Slopes are those of the values, whatever level of smoothing they are on.
+// Slopes are those of the values.
 TEST(gradients_of_realisations_under_varying_lengths_are_theirs) {
   for (const auto& at : {test::growing, test::stepping, test::rotating}) {
     const TensorFieldPtr field = test::along_x(at, 97, 5);
