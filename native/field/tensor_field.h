@@ -28,8 +28,10 @@ class TensorField {
   // At o + t d, with the derivative that holds at o + side d, where t lies at the end of a piece
   // that `side` lies in.
   virtual TensorSlope along(const Vec3& o, const Vec3& d, double t, double side) const = 0;
-  // Certified bounds of the eigenvalues over all space.
+  // Certified bounds of the eigenvalues over all space, and over a box (looked up: not for hot
+  // loops).
   virtual Range eigenvalues() const = 0;
+  virtual Range eigenvalues(const Box3& box) const = 0;
   // On the line o + t d, ∂_d A may jump (at the faces of cells). A bound of the sum of
   // √(⅛ tr((A⁻¹ J)²)) over the jumps J between two t. A process with the covariance of Paciorek and
   // Schervish has slopes that jump with these deviations.

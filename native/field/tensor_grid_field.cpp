@@ -1,5 +1,6 @@
 #include "field/tensor_grid_field.h"
 
+#include "core/box_image.h"
 #include "core/symmetric_eigen.h"
 #include "field/check.h"
 
@@ -23,7 +24,15 @@ bool positive_definite(const SymMat3& a) {
 TensorGridField::TensorGridField(Bricks bricks, const Affine& index_to_object,
                                  const std::function<std::string(const Index3&)>& node_name)
     : bricks_(std::move(bricks)), object_to_index_(inverse(index_to_object)) {
-  check_nodes(node_name);
+  const Index3& n = bricks_[0]->nodes();
+  eigenvalues_ = eigenvalues_of_nodes(
+      {0, 0, 0}, {n[0] - 1, n[1] - 1, n[2] - 1}, [&](const Index3& at, double least, double most) {
+        if (!(least > 1e-12 * most))
+          refuse("", node_name(at), " is a matrix with the eigenvalue ", least, " (the largest is ",
+                 most,
+                 "); the anisotropy takes squared length scales, all of whose eigenvalues are "
+                 "positive.");
+      });
   find_kinks();
 }
 
@@ -49,29 +58,44 @@ SymMat3 TensorGridField::node(const Index3& at) const {
 
 // Eigenvalues are computed only where they leave the range found so far, which two factorisations
 // tell; where nothing changes from node to node, not even these.
-void TensorGridField::check_nodes(const std::function<std::string(const Index3&)>& node_name) {
-  const Index3& n = bricks_[0]->nodes();
+template <class Check>
+Range TensorGridField::eigenvalues_of_nodes(const Index3& first, const Index3& last,
+                                            const Check& check) const {
   Range range{kInfinity, -kInfinity};
-  SymMat3 last;
-  for (int i = 0; i < n[0]; ++i)
-    for (int j = 0; j < n[1]; ++j)
-      for (int k = 0; k < n[2]; ++k) {
+  SymMat3 before;
+  for (int i = first[0]; i <= last[0]; ++i)
+    for (int j = first[1]; j <= last[1]; ++j)
+      for (int k = first[2]; k <= last[2]; ++k) {
         const SymMat3 a = node({i, j, k});
-        if (same(a, last)) continue;
-        last = a;
+        if (same(a, before)) continue;
+        before = a;
         if (range.max > 0 && positive_definite(a - SymMat3::identity(range.min)) &&
             positive_definite(SymMat3::identity(range.max) - a))
           continue;
         const auto e = eigenvalues_of(a);
-        if (!(e[0] > 1e-12 * e[2]))
-          refuse("", node_name({i, j, k}), " is a matrix with the eigenvalue ", e[0],
-                 " (the largest is ", e[2],
-                 "); the anisotropy takes squared length scales, all of whose eigenvalues are "
-                 "positive.");
+        check({i, j, k}, e[0], e[2]);
         range.min = std::min(range.min, e[0]);
         range.max = std::max(range.max, e[2]);
       }
-  eigenvalues_ = range;
+  return range;
+}
+
+// Between nodes A is a convex combination of theirs, outside it is the nearest value.
+Range TensorGridField::eigenvalues(const Box3& box) const {
+  const Box3 index = image_of(box, object_to_index_);
+  const Index3& n = bricks_[0]->nodes();
+  Index3 first, last;
+  bool all = true;
+  for (int a = 0; a < 3; ++a) {
+    const double end = n[a] - 1;
+    // An infinite or empty box: all of the nodes.
+    const bool known = index.min[a] <= index.max[a];
+    first[a] = known ? static_cast<int>(std::clamp(std::floor(index.min[a]), 0.0, end)) : 0;
+    last[a] = known ? static_cast<int>(std::clamp(std::ceil(index.max[a]), 0.0, end)) : n[a] - 1;
+    all &= first[a] == 0 && last[a] == n[a] - 1;
+  }
+  if (all) return eigenvalues_;
+  return eigenvalues_of_nodes(first, last, [](const Index3&, double, double) {});
 }
 
 // At a face across axis i, ∂_i A jumps by the second difference D of the nodes there; c is at most

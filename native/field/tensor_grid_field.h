@@ -24,6 +24,7 @@ class TensorGridField final : public TensorField {
   TensorSample sample(const Vec3& p) const override;
   TensorSlope along(const Vec3& o, const Vec3& d, double t, double side) const override;
   Range eigenvalues() const override { return eigenvalues_; }
+  Range eigenvalues(const Box3& box) const override;
   double kinks(const Vec3& o, const Vec3& d, double t_begin, double t_end) const override;
 
  private:
@@ -38,7 +39,10 @@ class TensorGridField final : public TensorField {
   SymMat3 node(const Index3& at) const;
   double kink_at(int axis, const Index3& at) const;
   double kink_across(int axis, const Place& at, int face) const;
-  void check_nodes(const std::function<std::string(const Index3&)>& node_name);
+  // Over the nodes first … last; `check` is called with the node, the least and the greatest
+  // eigenvalue of every one that widens the range.
+  template <class Check>
+  Range eigenvalues_of_nodes(const Index3& first, const Index3& last, const Check& check) const;
   void find_kinks();
 
   Bricks bricks_;

@@ -1,5 +1,6 @@
 #include "field/transformed_field.h"
 
+#include "core/box_image.h"
 #include "field/check.h"
 #include "field/constant_field.h"
 #include "field/grid_field.h"
@@ -31,14 +32,7 @@ TransformedField::TransformedField(FieldPtr field, const Affine& matrix)
   if (grid && !keeps_axes(matrix.linear)) field_ = grid->without_background();
   lipschitz_ = field_->lipschitz() / least;
   smooth_scale_ = field_->smooth_scale() * least;
-  if (const auto box = field_->support()) {
-    support_.emplace();
-    for (int corner = 0; corner < 8; ++corner) {
-      const Vec3 p{corner & 1 ? box->max.x : box->min.x, corner & 2 ? box->max.y : box->min.y,
-                   corner & 4 ? box->max.z : box->min.z};
-      support_->include(matrix.point(p));
-    }
-  }
+  if (const auto box = field_->support()) support_ = image_of(*box, matrix);
 }
 
 FieldPtr transformed(FieldPtr field, const Affine& matrix) {

@@ -1,16 +1,18 @@
 #include "field/transformed_tensor_field.h"
 
+#include "core/box_image.h"
 #include "field/check.h"
 
 namespace gpis {
 
 TransformedTensorField::TransformedTensorField(TensorFieldPtr field, const Affine& matrix)
     : field_(std::move(field)), linear_(matrix.linear) {
-  const Range stretch = check_transform(matrix);
+  stretch_ = check_transform(matrix);
   inverse_ = inverse(matrix);
-  const Range of_field = field_->eigenvalues();
-  eigenvalues_ = {of_field.min * stretch.min * stretch.min,
-                  of_field.max * stretch.max * stretch.max};
+}
+
+Range TransformedTensorField::eigenvalues(const Box3& box) const {
+  return stretched(field_->eigenvalues(image_of(box, inverse_)));
 }
 
 TensorSample TransformedTensorField::sample(const Vec3& p) const {

@@ -19,17 +19,23 @@ class TransformedTensorField final : public TensorField {
     const TensorSlope inner = field_->along(inverse_.point(o), inverse_.vector(d), t, side);
     return {congruence(linear_, inner.value), congruence(linear_, inner.slope)};
   }
-  Range eigenvalues() const override { return eigenvalues_; }
+  Range eigenvalues() const override { return stretched(field_->eigenvalues()); }
+  Range eigenvalues(const Box3& box) const override;
   // J becomes M J Mᵀ as A does: A⁻¹J keeps its eigenvalues.
   double kinks(const Vec3& o, const Vec3& d, double t_begin, double t_end) const override {
     return field_->kinks(inverse_.point(o), inverse_.vector(d), t_begin, t_end);
   }
 
  private:
+  // Of M A Mᵀ, from those of A.
+  Range stretched(const Range& r) const {
+    return {r.min * stretch_.min * stretch_.min, r.max * stretch_.max * stretch_.max};
+  }
+
   TensorFieldPtr field_;
   Mat3 linear_;
   Affine inverse_;
-  Range eigenvalues_;
+  Range stretch_;
 };
 
 }  // namespace gpis

@@ -174,9 +174,11 @@ void TileWorker::draw(int realisation) {
     if (!needed) continue;
     const GaussianProcess& process =
         *composition_.tree().leaves()[composition_.leaf_of_source(source)].process;
-    if (!realisations_[source])
+    if (!realisations_[source]) {
+      Realisation::check(process, query_.bounds);
       realisations_[source] =
           std::make_unique<Realisation>(process, Realisation::Access::rows, nullptr);
+    }
     // One realisation is one function of space, whatever tile looks at it.
     const std::uint64_t key =
         mix64(mix64(mix64(query_.seed) ^ static_cast<std::uint64_t>(realisation)) ^

@@ -127,7 +127,7 @@ FieldSample Realisation::free_sample(const Vec3& x) {
 void Realisation::add_lattices(const Vec3& x, FieldSample& g) {
   for (LatticeField& field : lattices_) field.add(noise_, x, g);
   for (Varying& part : varying_) {
-    const FieldSample varying = part.lattice.sample(noise_, x);
+    const FieldSample varying = part.lattice.sample(noise_, smoothed_, x);
     g.value += part.scale * varying.value;
     g.gradient += varying.gradient * part.scale;
   }
@@ -187,7 +187,8 @@ void Realisation::fill(const Vec3& origin, double spacing, const std::array<int,
         for (int i = 0; i < size[0]; ++i)
           for (int k = k0; k < std::min(k0 + kNeighbours, size[2]); ++k) {
             const Vec3 x = origin + Vec3{double(i), double(j), double(k)} * spacing;
-            row(i, j)[k] += static_cast<float>(part.scale * part.lattice.value(noise_, x));
+            row(i, j)[k] +=
+                static_cast<float>(part.scale * part.lattice.value(noise_, smoothed_, x));
           }
   for (SpectralField& field : spectra_)
     for (int i = 0; i < size[0]; ++i)

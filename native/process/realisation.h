@@ -23,6 +23,10 @@ class Realisation {
   // Throws std::invalid_argument where the kernel has no normal form, or none under its anisotropy.
   // `posterior`: of the conditions that the process has, null where it has none.
   Realisation(const GaussianProcess& process, Access access, PosteriorPtr posterior);
+  // Refuses bounds to be asked for in which length scales are too long for it.
+  static void check(const GaussianProcess& process, const Box3& bounds) {
+    if (process.anisotropy) VaryingLattice::check(*process.anisotropy, bounds);
+  }
 
   // Another realisation, a pure function of (seed, time). `time` in temporal length scales: the
   // realisations of one seed at two times are correlated as exp(-Δ²/2).
@@ -73,6 +77,7 @@ class Realisation {
   std::vector<LatticeField> lattices_;
   std::vector<SpectralField> spectra_;
   LatticeNoise noise_;
+  SmoothedNoise smoothed_;  // of the lattices in varying_
   std::uint64_t seed_ = 0, spectral_normals_ = 0;
   std::optional<double> time_;
   bool drawn_ = false;

@@ -30,6 +30,7 @@ std::optional<RealisationGrid> realise(const GaussianProcess& process,
                                        const RealisationQuery& query,
                                        const std::function<bool(double)>& progress) {
   RealisationGrid grid = empty_grid(query);
+  Realisation::check(process, query.bounds);
   const auto& [nx, ny, nz] = grid.resolution;
   const int tiles_y = (ny - 1) / kTile[1] + 1, tiles = ((nx - 1) / kTile[0] + 1) * tiles_y;
 
@@ -72,6 +73,9 @@ std::optional<RealisationGrid> realise(const GaussianProcess& process,
 std::vector<FieldSample> realise_at(const GaussianProcess& process, const std::vector<Vec3>& points,
                                     std::uint64_t seed, int count, int threads) {
   std::vector<FieldSample> out(points.size() * count);
+  Box3 bounds;
+  for (const Vec3& p : points) bounds.include(p);
+  if (!points.empty()) Realisation::check(process, bounds);
   const PosteriorPtr posterior = posterior_of(process);
   tbb::enumerable_thread_specific<Realisation> workers(
       [&] { return Realisation(process, Realisation::Access::rays, posterior); });

@@ -27,11 +27,12 @@ Eigen::Vector4d row(double value, const Vec3& slope) {
 
 }  // namespace
 
-RealisationPath::Plan::Plan(const GaussianProcess& p, const Box3&)
+RealisationPath::Plan::Plan(const GaussianProcess& p, const Box3& bounds)
     : process(std::make_shared<GaussianProcess>(p)), covariance(std::make_shared<Covariance>(p)) {
   if (!covariance->differentiable())
     refuse("The kernel ", p.kernel->describe(),
            " has no gradient: the realisation sampler cannot find its surface.");
+  Realisation::check(p, bounds);
   posterior = posterior_of(p);
   correlation_error = Realisation(p, Realisation::Access::rays, nullptr).correlation_error();
 }

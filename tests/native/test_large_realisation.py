@@ -4,6 +4,7 @@ import gpis_native as gn
 import numpy as np
 import pytest
 from statistics_checks import check_z
+from tensor_grids import along_x, isotropic
 
 pytestmark = pytest.mark.stats
 NODES, LENGTH, SIGMA = 256, 0.05, 0.03
@@ -75,3 +76,24 @@ def test_it_is_a_level_set(made, tmp_path):
     hits = gn.first_hits(surface, origins, np.tile([0.0, 0, -1], (200, 1)), 10)
     assert np.isfinite(hits["t"]).all()
     check_linear(gp.realisation_at(hits["position"], 5)["value"])
+
+
+def test_lengths_that_vary_on_a_grid_of_many_nodes(seed):
+    """Lengths from .1 to .4: nodes are the values at points, and in a plane where the lengths are one the covariance is that of
+    Paciorek and Schervish with another such plane (here ((l l')/s²)^{3/2} exp(-r²/2s²), s² the mean of their squares)."""
+    nodes, length = 48, lambda x: 0.1 * 4 ** np.clip(x + 0.5, 0, 1)
+    field = along_x(lambda x: isotropic(length(x)), 2, 129)
+    gp = gn.GaussianProcess(0.0, 1.0, gn.SquaredExponential(1.0), anisotropy=field)
+    step = 2 / (nodes - 1)
+    grid = gp.realisation(((-1, -1, -1), (1, 1, 1)), nodes, seed)["realisation"]
+    index = np.random.default_rng(seed).integers(0, nodes, (60, 3))
+    np.testing.assert_allclose(grid[tuple(index.T)], gp.realisation_at(-1 + step * index, seed)["value"][0], atol=1e-5)
+    area = (2 - 0.1) ** 2
+    for i, j, lag in [(5, 5, 0), (10, 11, 1), (22, 24, 1), (24, 25, 0)]:
+        # As it is interpolated.
+        a, b = (np.sqrt(field([[-1 + step * n, 0, 0]])[0, 0]) for n in (i, j))
+        s2, r2 = (a * a + b * b) / 2, step**2 * ((i - j) ** 2 + lag**2)
+        expected = (a * b / s2) ** 1.5 * np.exp(-r2 / (2 * s2))
+        product = np.mean(grid[i, lag:, :] * grid[j, : nodes - lag, :], dtype=float)
+        # Variance as above, of a plane; edges make it a little more.
+        check_z(product, expected, np.sqrt(np.pi * s2 * (1 + expected**2) / area), f"{i} {j} {lag}")

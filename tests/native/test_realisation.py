@@ -9,6 +9,7 @@ import gpis_native as gn
 import numpy as np
 import pytest
 from statistics_checks import check_same_distribution, check_z
+from tensor_grids import along_x, isotropic
 
 pytestmark = pytest.mark.stats
 TURN = [0.9, 0.3, -0.2, 0.1]
@@ -301,6 +302,40 @@ def test_mixtures_under_varying_length_scales(kernel, full_size, seed):
     index = np.array([[1, 2, 3], [2, 1, 0]])
     nodes = np.array(grid["origin"]) + index * grid["voxel_size"]
     assert np.allclose(grid["realisation"][tuple(index.T)], gp.realisation_at(nodes, seed)["value"][0], atol=1e-5)
+
+
+LONG = along_x(lambda x: isotropic(np.exp(0.25 * x)), 20, 89)  # lengths of .6 to 148, a quarter apart
+
+
+def test_lengths_outside_the_bounds_do_not_count(tmp_path, seed):
+    """The longest length counts where it is asked for: grids, points and lines."""
+    path = tmp_path / "long.vdb"
+    x = np.linspace(-2, 20, 89)
+    a = np.broadcast_to(np.array([isotropic(np.exp(0.25 * v)) for v in x])[:, None, None], (89, 2, 2, 6))
+    gn.write_vdb(path, {"anisotropy": a, "mean": np.ones(a.shape[:3]), "voxel_size": [0.25, 10, 10], "origin": [-2, -5, -5]})
+    moved = np.diag([-1.0, 1, 1, 1])
+    refused = r"within the bounds is [\d.]+, [\d.]+ times the shortest of the whole field, 0.606531: .* ratio of up to 8\. "
+    for field, turn in [(LONG, 1), (gn.VdbTensorField(path), 1), (LONG.transformed(moved), -1)]:
+        gp = gn.GaussianProcess(0.0, 1.0, gn.SquaredExponential(1.0), anisotropy=field)
+        box = np.sort(turn * np.array([-2, 2.0]))
+        grid = gp.realisation(((box[0], -1, -1), (box[1], 1, 1)), 9, seed)
+        nodes = np.array(grid["origin"]) + np.array([[1, 2, 3], [6, 4, 1]]) * grid["voxel_size"]
+        np.testing.assert_allclose(
+            gp.realisation_at(nodes, seed)["value"][0], grid["realisation"][[1, 6], [2, 4], [3, 1]], atol=1e-5
+        )
+        box = np.sort(turn * np.array([-2, 12.0]))
+        with pytest.raises(ValueError, match=refused):
+            gp.realisation(((box[0], -1, -1), (box[1], 1, 1)), 9, seed)
+        with pytest.raises(ValueError, match=refused):
+            gp.realisation_at([[0, 0, 0], [turn * 12.0, 0, 0]], seed)
+    for end in (2, 12):
+        gp = gn.GaussianProcess(0.0, 1.0, gn.SquaredExponential(1.0), anisotropy=LONG, bounds=((-2, -1, -1), (end, 1, 1)))
+        ray = [(0.5, 0, 2)], [(0, 0, -1)], 4
+        if end == 2:
+            assert gn.first_hits(gp, *ray, sampler="realisation", seed=seed)["t"].shape == (1,)
+        else:
+            with pytest.raises(ValueError, match=refused):
+                gn.first_hits(gp, *ray, sampler="realisation", seed=seed)
 
 
 def test_mixtures_that_take_too_many_lengths_are_refused():

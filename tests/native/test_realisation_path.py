@@ -4,6 +4,7 @@ one for a whole path (memory global). Oracles of the design, numbered as there."
 import gpis_native as gn
 import numpy as np
 import pytest
+import tensor_grids
 from scene_parts import BLACK, WHITE_SUNS
 from statistics_checks import Z_LIMIT, check_proportion, check_z
 
@@ -157,13 +158,17 @@ def test_global_at_infinite_length_scale(seed):
 
 def test_time_correlates_realisations(full_size, seed):
     """exp(-Δ²/2) over Δ time scales, times the kernel in space; amplitudes of features and nodes of lattices alike."""
-    n = 40_000 if full_size else 1500
+    most = 40_000 if full_size else 1500
     points = np.array([[0.1, 0.2, 0.3], [0.5, 0.2, 0.1]])
-    for kernel in (gn.SquaredExponential(0.7), gn.Matern(2.5, 0.7)):
-        k = kernel(points, points)
+    varying = tensor_grids.along_x(lambda x: tensor_grids.isotropic(np.exp(0.25 * x)), 5, 61)
+    for kernel, anisotropy in (
+        (gn.SquaredExponential(0.7), None), (gn.Matern(2.5, 0.7), None), (gn.SquaredExponential(0.7), varying)
+    ):  # fmt: skip
+        n = most // 8 if anisotropy else most
         values = []
         for time in (3.0, 3.2, 5.0):
-            gp = gn.GaussianProcess(0.0, 1.0, kernel, time_scale=2.0, time=time)
+            gp = gn.GaussianProcess(0.0, 1.0, kernel, anisotropy=anisotropy, time_scale=2.0, time=time)
+            k = gp.covariance(points, points)
             values.append(gp.realisation_at(points, seed, n)["value"])
         for a, b, gap in [(0, 0, 0), (0, 1, 0.1), (0, 2, 1.0), (1, 2, 0.9)]:
             expected = k * np.exp(-(gap**2) / 2)
