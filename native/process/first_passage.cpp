@@ -180,8 +180,7 @@ std::shared_ptr<const FirstPassage> FirstPassage::make(const Radial& radial, dou
                                                        const std::atomic<bool>* stop) {
   struct Kept {
     Radial radial;
-    double level, longest;
-    std::size_t count;
+    double level, longest, missed_root;
     std::shared_ptr<const FirstPassage> table;
   };
   static std::mutex mutex;
@@ -189,15 +188,14 @@ std::shared_ptr<const FirstPassage> FirstPassage::make(const Radial& radial, dou
   constexpr std::size_t kMostKept = 4;
   Excursions drawn;
   drawn.longest = drawn_to(radial, level, longest);
-  const std::size_t count = excursions(missed_root);
   const std::lock_guard lock(mutex);
   for (const Kept& k : kept)
     if (k.radial.family == radial.family && k.radial.alpha == radial.alpha && k.level == level &&
-        k.longest == drawn.longest && k.count == count)
+        k.longest == drawn.longest && k.missed_root == missed_root)
       return k.table;
   if (!draw(radial, level, missed_root, stop, drawn)) return nullptr;
   std::shared_ptr<const FirstPassage> table(new FirstPassage(radial, level, drawn));
-  kept.push_front({radial, level, drawn.longest, count, table});
+  kept.push_front({radial, level, drawn.longest, missed_root, table});
   if (kept.size() > kMostKept) kept.pop_back();
   return table;
 }

@@ -36,7 +36,9 @@ class FirstPassage {
                                                   const std::atomic<bool>* stop);
 
   // How many are drawn: the standard deviation of a probability, √(p(1-p)/n), stays below .71
-  // missed_root.
+  // missed_root, for rays of all slopes together. Rays of nearly one slope share few of them:
+  // 12,000 at a deviation, some hundreds at a hundredth of it, where what a table says is off by as
+  // much more. Which excursions it holds does not depend on a render's seed.
   static std::size_t excursions(double missed_root);
 
   // From outside, nothing else known.

@@ -155,7 +155,7 @@ void plan_first_passage(PlannedLine& plan, const GaussianProcess& process, doubl
       make_first_passage(process, plan.bounds, missed_root, plan.line_sampler->correlation_error());
   plan.sampler_reason =
       "first_passage: mean and deviation are constant, hits come out of a table of " +
-      std::to_string(count) + " excursions (standard deviation of a probability: " +
+      std::to_string(count) + " excursions (standard deviation of a probability over all slopes: " +
       number_text(std::round(0.5e5 / std::sqrt(count)) / 1e5) + "), nothing is marched";
 }
 

@@ -5,6 +5,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include "process/conditions.h"
 #include "process/node_grid.h"
 #include "process/realisation.h"
 
@@ -14,6 +15,13 @@ namespace {
 // A tile is drawn by one thread: 8 x 16 rows along z share most of their lattice nodes.
 constexpr int kTile[2] = {8, 16};
 constexpr int kTilesBetweenReports = 16;
+
+// Conditions are met by what is drawn at them too.
+void check_lengths(const GaussianProcess& process, Box3 bounds) {
+  if (process.conditions)
+    for (const Conditions::Point& p : process.conditions->points) bounds.include(p.at);
+  Realisation::check(process, bounds);
+}
 
 int arena_of(int threads) {
   return threads > 0 ? threads : tbb::task_arena::automatic;
@@ -30,7 +38,7 @@ std::optional<RealisationGrid> realise(const GaussianProcess& process,
                                        const RealisationQuery& query,
                                        const std::function<bool(double)>& progress) {
   RealisationGrid grid = empty_grid(query);
-  Realisation::check(process, query.bounds);
+  check_lengths(process, query.bounds);
   const auto& [nx, ny, nz] = grid.resolution;
   const int tiles_y = (ny - 1) / kTile[1] + 1, tiles = ((nx - 1) / kTile[0] + 1) * tiles_y;
 
@@ -75,7 +83,7 @@ std::vector<FieldSample> realise_at(const GaussianProcess& process, const std::v
   std::vector<FieldSample> out(points.size() * count);
   Box3 bounds;
   for (const Vec3& p : points) bounds.include(p);
-  if (!points.empty()) Realisation::check(process, bounds);
+  if (!points.empty()) check_lengths(process, bounds);
   const PosteriorPtr posterior = posterior_of(process);
   tbb::enumerable_thread_specific<Realisation> workers(
       [&] { return Realisation(process, Realisation::Access::rays, posterior); });

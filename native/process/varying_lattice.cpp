@@ -41,9 +41,10 @@ VaryingLattice::View VaryingLattice::window(LatticeNoise& noise, SmoothedNoise& 
       w.first[a] = e.first[a] - kMargin;
       w.size[a] = e.size[a] + 2 * kMargin;
     }
-    w.noise.resize(static_cast<std::size_t>(w.size[0]) * w.size[1] * w.size[2]);
+    const std::size_t nodes = static_cast<std::size_t>(w.size[0]) * w.size[1] * w.size[2];
+    w.noise.resize(nodes + 3);  // the last row of a reused window is read in fours
     if (e.level < 0) {
-      normals_.resize(w.noise.size());
+      normals_.resize(nodes);
       noise.window(white_.number, 0, w.first, w.size, normals_.data());
       std::copy(normals_.begin(), normals_.end(), w.noise.begin());
     } else {
@@ -109,7 +110,7 @@ void VaryingLattice::rows(const Ellipsoid& e, const Vec3& x, const View& view, c
 
 // Weights of a row as const · exp(-p.xx (ih)²) · exp(-2 p.xx c h)^i from its first node at c: the
 // first factor is the same in all rows, the powers of the last go four by four, in single precision
-// (up to e^70, times as little; nodes up to the next four are there: kMargin).
+// (up to e^70, times as little; what is read behind a row is multiplied by next to nothing).
 double VaryingLattice::value(LatticeNoise& noise, SmoothedNoise& smoothed, const Vec3& x) {
   using Four = Eigen::Array<float, 4, 1>;
   const Ellipsoid e(a_->value(x) * length2_, white_, x, true);

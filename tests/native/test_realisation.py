@@ -330,6 +330,11 @@ def test_lengths_outside_the_bounds_do_not_count(tmp_path, seed):
             gp.realisation(((box[0], -1, -1), (box[1], 1, 1)), 9, seed)
         with pytest.raises(ValueError, match=refused):
             gp.realisation_at([[0, 0, 0], [turn * 12.0, 0, 0]], seed)
+        # A condition is met by what is drawn at it, wherever it lies.
+        far = {"points": [(turn * 12.0, 0, 0)], "values": [0.0]}
+        held = gn.GaussianProcess(0.0, 1.0, gn.SquaredExponential(1.0), anisotropy=field, conditions=far)
+        with pytest.raises(ValueError, match=refused):
+            held.realisation(((-1, -1, -1), (1, 1, 1)), 9, seed)
     for end in (2, 12):
         gp = gn.GaussianProcess(0.0, 1.0, gn.SquaredExponential(1.0), anisotropy=LONG, bounds=((-2, -1, -1), (end, 1, 1)))
         ray = [(0.5, 0, 2)], [(0, 0, -1)], 4
