@@ -35,7 +35,6 @@ class FirstPassageSampler final : public LineSampler {
     ++counters.line_tabulated;
     RadialLine& frame = line.path<RadialLine>();
     frame.reset(line_, line.geometry, t_begin);
-    line.anchor = t_begin;
     const double per_t = frame.inverse_length();
     FirstPassage::Passage passage;
     if (start.kind == Start::Kind::outside) {

@@ -4,6 +4,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "core/box_image.h"
 #include "process/conditions.h"
 #include "process/joint_line.h"
 #include "process/line_impl.h"
@@ -54,10 +55,7 @@ ProcessSurface::ProcessSurface(std::shared_ptr<const GaussianProcess> process,
   world_to_object_ = inverse(object_to_world);
   const Box3& box = planned_->bounds;
   if (std::isfinite(length(box.max - box.min))) {
-    for (int corner = 0; corner < 8; ++corner)
-      world_bounds_.include(object_to_world.point({corner & 1 ? box.max.x : box.min.x,
-                                                   corner & 2 ? box.max.y : box.min.y,
-                                                   corner & 4 ? box.max.z : box.min.z}));
+    world_bounds_ = image_of(box, object_to_world);
   } else {
     world_bounds_ = {{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
   }

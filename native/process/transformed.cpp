@@ -1,5 +1,6 @@
 #include "process/transformed.h"
 
+#include "core/box_image.h"
 #include "field/check.h"
 #include "field/transformed_field.h"
 #include "field/transformed_tensor_field.h"
@@ -30,15 +31,7 @@ std::shared_ptr<GaussianProcess> transformed(const GaussianProcess& process, con
     out->kernel =
         std::make_shared<TransformedKernel>(process.kernel, inverse(matrix.linear), least_stretch);
   }
-  if (process.bounds) {
-    const Box3& box = *process.bounds;
-    Box3 around;
-    for (int corner = 0; corner < 8; ++corner)
-      around.include(
-          matrix.point({corner & 1 ? box.max.x : box.min.x, corner & 2 ? box.max.y : box.min.y,
-                        corner & 4 ? box.max.z : box.min.z}));
-    out->bounds = around;
-  }
+  if (process.bounds) out->bounds = image_of(*process.bounds, matrix);
   if (process.conditions) {
     const Affine back = inverse(matrix);
     std::vector<Conditions::Point> points = process.conditions->points;
