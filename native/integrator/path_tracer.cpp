@@ -76,6 +76,8 @@ struct PathTracer::Impl {
   std::vector<Start> starts;
   TreeSurface::March march;
   std::vector<BoxTree::Entry> queue;
+  // Bodies that the ray in hand, being inside, has left by bounds, and where.
+  std::vector<std::pair<int, double>> left;
   // Of the body that was hit, for shadow rays that leave it, and of whatever body they meet.
   std::vector<std::optional<State>> shadow_states;
   std::vector<RealisationMemory> shadow_realisations;
@@ -191,10 +193,12 @@ bool PathTracer::Impl::closest(const Ray& ray, double t_max, Vertex& v) {
       scene.triangles && scene.triangles->intersect(ray, nearest, mesh, *counters);
   if (hit_mesh) nearest = mesh.t;
   path.begin_ray();
+  left.clear();
   scene.body_boxes.visit(ray, nearest, queue, [&](int b) {
     path.enter(b);
     const TreeHit hit = first_hit(b, path.inside(b), lines_of(b), ray, nearest, path.states(b),
                                   path.realisations(b), *rng);
+    if (hit.left < kInfinity) left.push_back({b, hit.left});
     if (hit.t < nearest) {
       nearest = hit.t;
       v.surface = static_cast<int>(scene.bodies[b].first) + hit.leaf;
@@ -231,6 +235,11 @@ bool PathTracer::Impl::closest(const Ray& ray, double t_max, Vertex& v) {
 // The ray is inside no more of bodies whose bounds it leaves before t: where there is no surface,
 // no index changes (definitions B4).
 void PathTracer::Impl::leave_bounds(const Ray& ray, double t) {
+  for (const auto& [b, at] : left) {
+    if (!(at < t)) continue;
+    path.cross(b);
+    ++counters->bounds_exits;
+  }
   for (const int b : path.begun()) {
     if (!path.inside(b) || !scene.bodies[b].surface.leaves_bounds(ray, t)) continue;
     path.cross(b);

@@ -4,10 +4,12 @@
 
 namespace gpis {
 
-TreeHit BlendMarch::first_hit(const ProcessTree& tree, std::span<const PlannedLine* const> plans,
+TreeHit BlendMarch::first_hit(const ProcessTree& tree, const ProcessTree* beyond,
+                              std::span<const PlannedLine* const> plans,
                               const LineGeometry& geometry, std::span<Line> lines, double t_max,
                               std::span<const Start> starts, Rng& rng, Counters& counters) {
   tree_ = &tree;
+  beyond_ = beyond;
   rng_ = &rng;
   counters_ = &counters;
   hit_ = {};
@@ -29,7 +31,10 @@ bool BlendMarch::march(double t_end) {
   const std::atomic<bool>* stop = lines_.leaves[0].line->stop;
   for (int steps = 0; steps < kMaxSteps; ++steps) {
     if (steps % kStepsToStop == kStepsToStop - 1 && stop && *stop) return false;
-    if (lines_.skip_certain(*tree_, from_, a, outside_)) {
+    const bool leaving = leaving_by_bounds(a);
+    const double here = a;
+    if (lines_.skip_certain(*tree_, from_, a, outside_, leaving)) {
+      if (leaving && !outside_) leave_by_bounds(here);
       if (!(a < t_end)) return false;
       continue;
     }
@@ -73,6 +78,15 @@ void BlendMarch::step_over(double a, double t_end) {
     l.new_piece = false;
     lines_.point(to_, static_cast<int>(i));
   }
+}
+
+// As TreeMarch's.
+void BlendMarch::leave_by_bounds(double a) {
+  hit_.left = a;
+  outside_ = true;
+  tree_ = beyond_;
+  beyond_ = nullptr;
+  lines_.turn_inside_out(from_, to_);
 }
 
 void BlendMarch::advance() {
@@ -222,7 +236,8 @@ void BlendMarch::hit(TreeSample& sample) {
   std::size_t leaf = 0;
   for (std::size_t i = 1; i < weights_.size(); ++i)
     if (weights_[i] > weights_[leaf]) leaf = i;
-  hit_ = {p.t, static_cast<int>(leaf)};
+  hit_.t = p.t;
+  hit_.leaf = static_cast<int>(leaf);
   const LeafPoint& found = lines_.point(sample, hit_.leaf);
   const Leaf& l = lines_.leaves[leaf];
   l.line->hit_t = found.t;

@@ -16,9 +16,10 @@ namespace gpis {
 class BlendMarch {
  public:
   // As TreeMarch; a ray leaves the surface where the states of `starts` compose to F = 0.
-  TreeHit first_hit(const ProcessTree& tree, std::span<const PlannedLine* const> plans,
-                    const LineGeometry& geometry, std::span<Line> lines, double t_max,
-                    std::span<const Start> starts, Rng& rng, Counters& counters);
+  TreeHit first_hit(const ProcessTree& tree, const ProcessTree* beyond,
+                    std::span<const PlannedLine* const> plans, const LineGeometry& geometry,
+                    std::span<Line> lines, double t_max, std::span<const Start> starts, Rng& rng,
+                    Counters& counters);
 
  private:
   static constexpr int kMaxSteps = 1 << 20;
@@ -47,6 +48,10 @@ class BlendMarch {
   // blend_march.cpp
   bool march(double t_end);
   void step_over(double a, double t_end);
+  bool leaving_by_bounds(double a) const {
+    return beyond_ && outside_ && lines_.complement_ends(a);
+  }
+  void leave_by_bounds(double a);
   void advance();
   bool search(TreeSample& a, TreeSample& b, int depth);
   Enclosure enclose(TreeSample& a, TreeSample& b);
@@ -66,6 +71,7 @@ class BlendMarch {
   bool is_fresh(int noise) const;
 
   const ProcessTree* tree_ = nullptr;
+  const ProcessTree* beyond_ = nullptr;
   TreeLines lines_;
   Rng* rng_ = nullptr;
   Counters* counters_ = nullptr;

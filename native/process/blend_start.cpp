@@ -178,8 +178,10 @@ void BlendMarch::engage(double a) {
     p.known = n.begun = n.current = true;
     fresh_.push_back(l.noise);
   }
-  if (!fresh_.empty()) draw_outside();
-  if (grew && outside_ && !(leaving_ && a == 0) && at(from_).f < 0) {
+  const bool by_bounds = leaving_by_bounds(a);
+  if (!fresh_.empty() && !by_bounds) draw_outside();
+  if ((grew || by_bounds) && outside_ && !(leaving_ && a == 0) && at(from_).f < 0) {
+    if (by_bounds) return leave_by_bounds(a);
     outside_ = false;
     ++counters_->line_entry_inside;
   }

@@ -92,7 +92,8 @@ FirstHits first_hits(const TreeSurface& surface, const FirstHitsQuery& query) {
       surface, query, result.realisation,
       [&](std::size_t i, std::vector<Line>& lines, const TreeHit& hit, Rng& rng,
           Counters& counters) {
-        if (hit.leaf < 0) return;
+        // A ray inside that leaves by bounds has no hit, as one that leaves a process of its own.
+        if (hit.leaf < 0 || hit.left < kInfinity) return;
         result.t[i] = hit.t;
         result.leaf[i] = hit.leaf;
         result.position[i] = query.rays[i].at(hit.t);

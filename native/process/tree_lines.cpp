@@ -185,10 +185,39 @@ void TreeLines::enter_outside(const ProcessTree& tree, double a, Stretch& sure) 
   }
 }
 
-bool TreeLines::skip_certain(const ProcessTree& tree, TreeSample& from, double& a, bool& outside) {
+bool TreeLines::matters(const ProcessTree& tree, int node, int leaf) const {
+  const ProcessTree::Node& n = tree.nodes()[node];
+  if (n.kind == ProcessTree::Kind::leaf) return n.leaf == leaf;
+  const int dominant = n.kind == ProcessTree::Kind::least ? -1 : 1;
+  const auto above = [&](int child) { return matters(tree, child, leaf); };
+  const auto decides = [&](int child) { return certain(tree, child).sign == dominant; };
+  return std::any_of(n.children.begin(), n.children.end(), above) &&
+         std::none_of(n.children.begin(), n.children.end(), decides);
+}
+
+bool TreeLines::complement_ends(double a) const {
+  return std::any_of(leaves.begin(), leaves.end(), [a](const Leaf& l) {
+    return l.sign < 0 && l.t_begin < l.t_end && l.t_end == a;
+  });
+}
+
+void TreeLines::turn_inside_out(TreeSample& sample, TreeSample& other) {
+  for (Leaf& l : leaves) {
+    l.sign = -l.sign;
+    l.certain = -l.certain;
+  }
+  for (TreeSample* s : {&sample, &other})
+    for (LeafPoint& p : s->leaf) {
+      p.f = -p.f;
+      p.df = -p.df;
+    }
+}
+
+bool TreeLines::skip_certain(const ProcessTree& tree, TreeSample& from, double& a, bool& outside,
+                             bool leaving) {
   for (std::size_t i = 0; i < leaves.size(); ++i) look_ahead(leaves[i], a, from.leaf[i]);
   Stretch sure = certain(tree, tree.root());
-  if (sure.sign < 0 && outside) enter_outside(tree, a, sure);
+  if (sure.sign < 0 && outside && !leaving) enter_outside(tree, a, sure);
   if (sure.sign == 0) return false;
   // Inside of what has no deviation: the camera is, or bounds cut it or a subtracted leaf off.
   // Where a ray inside a body leaves its bounds, there is no surface to count (B4).

@@ -94,7 +94,15 @@ class TreeLines {
   Stretch certain(const ProcessTree& tree, int node) const;
   // Where F is certain at a: leads a to where it is not, `outside` to F > 0 there, forgets what was
   // looked at, and returns true. A ray outside that enters a random leaf has it drawn instead.
-  bool skip_certain(const ProcessTree& tree, TreeSample& from, double& a, bool& outside);
+  // `leaving`: a ray inside is at the end of bounds, where nothing holds it inside.
+  bool skip_certain(const ProcessTree& tree, TreeSample& from, double& a, bool& outside,
+                    bool leaving);
+  // Whether F depends on the leaf, given what is certain of others.
+  bool matters(const ProcessTree& tree, int node, int leaf) const;
+  // Whether bounds end at a of a leaf that counts as its complement, and held F up till there.
+  bool complement_ends(double a) const;
+  // From now on all leaves count as their complements, in what is known of them as well.
+  void turn_inside_out(TreeSample& sample, TreeSample& other);
 
   // f = μ + σ g, f' = μ' + gσ' + σ g' (math.md §2).
   LeafPoint combine(const Leaf& leaf, double t, double g, double dg);

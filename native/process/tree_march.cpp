@@ -4,11 +4,13 @@
 
 namespace gpis {
 
-TreeHit TreeMarch::first_hit(const ProcessTree& tree, std::span<const PlannedLine* const> plans,
+TreeHit TreeMarch::first_hit(const ProcessTree& tree, const ProcessTree* beyond,
+                             std::span<const PlannedLine* const> plans,
                              const LineGeometry& geometry, std::span<Line> lines, double t_max,
                              std::span<const Start> starts, bool kept, Rng& rng,
                              Counters& counters) {
   tree_ = &tree;
+  beyond_ = beyond;
   kept_ = kept;
   rng_ = &rng;
   counters_ = &counters;
@@ -28,7 +30,10 @@ bool TreeMarch::march(double t_end) {
   const std::atomic<bool>* stop = lines_.leaves[0].line->stop;
   for (int steps = 0; steps < kMaxSteps; ++steps) {
     if (steps % kStepsToStop == kStepsToStop - 1 && stop && *stop) return false;
-    if (lines_.skip_certain(*tree_, from_, a, outside_)) {
+    const bool leaving = leaving_by_bounds(a);
+    const double here = a;
+    if (lines_.skip_certain(*tree_, from_, a, outside_, leaving)) {
+      if (leaving && !outside_) leave_by_bounds(here);
       if (!(a < t_end)) return false;
       continue;
     }
@@ -81,6 +86,8 @@ int TreeMarch::step_over(double a, double t_end) {
     const int sign = tree_->sign(tree_->root(), [&](int i) {
       if (signs[i] != 0 || grew_) return signs[i];
       if (!lines_.leaves[i].engaged) {
+        // Drawn before it matters, it would not be drawn jointly with what it matters with (C7).
+        if (!lines_.matters(*tree_, tree_->root(), i)) return signs[i] = 1;
         engage(i, a);
         engaged = grew_ = true;
         return 0;
@@ -88,12 +95,28 @@ int TreeMarch::step_over(double a, double t_end) {
       return sign_over(i, signs, from_, to_);
     });
     if (grew_) continue;
-    if (engaged && outside_ && sign_here(from_) < 0) {
+    const bool leaving = leaving_by_bounds(a);
+    if ((engaged || leaving) && outside_ && sign_here(from_) < 0) {
+      if (leaving) {
+        leave_by_bounds(a);
+        for (int& s : signs) s = -s;
+        return -sign;
+      }
       outside_ = false;
       ++counters_->line_entry_inside;
     }
     return sign;
   }
+}
+
+// Where a ray from inside is at the end of the bounds of what it was in there is no surface
+// (definitions B4): it goes on outside of the body, along the same paths.
+void TreeMarch::leave_by_bounds(double a) {
+  hit_.left = a;
+  outside_ = true;
+  tree_ = beyond_;
+  beyond_ = nullptr;
+  lines_.turn_inside_out(from_, to_);
 }
 
 // On to the end of the step; leaves that it did not take are left behind.
@@ -222,7 +245,8 @@ void TreeMarch::refine(int leaf, const LeafPoint& lo, const LeafPoint& hi) {
 }
 
 void TreeMarch::hit(int leaf, const LeafPoint& p) {
-  hit_ = {p.t, leaf};
+  hit_.t = p.t;
+  hit_.leaf = leaf;
   const Leaf& l = lines_.leaves[leaf];
   l.line->hit_t = p.t;
   l.line->hit_g = p.g;

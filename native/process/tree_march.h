@@ -14,16 +14,21 @@ namespace gpis {
 struct TreeHit {
   double t = kInfinity;
   int leaf = -1;
+  // Where a ray from inside has left the body before, by bounds: what it hits, it hits from
+  // outside.
+  double left = kInfinity;
 };
 
 // Reused from ray to ray: keeps its buffers.
 class TreeMarch {
  public:
   // `starts`: one a leaf; a leaf with value 0 is the one whose surface the ray leaves. `kept`:
-  // paths are of realisations that are there already (memory `global`).
-  TreeHit first_hit(const ProcessTree& tree, std::span<const PlannedLine* const> plans,
-                    const LineGeometry& geometry, std::span<Line> lines, double t_max,
-                    std::span<const Start> starts, bool kept, Rng& rng, Counters& counters);
+  // paths are of realisations that are there already (memory `global`). `beyond`: the tree that a
+  // ray from inside sees once it has left the body by bounds, null for rays from outside.
+  TreeHit first_hit(const ProcessTree& tree, const ProcessTree* beyond,
+                    std::span<const PlannedLine* const> plans, const LineGeometry& geometry,
+                    std::span<Line> lines, double t_max, std::span<const Start> starts, bool kept,
+                    Rng& rng, Counters& counters);
 
  private:
   static constexpr int kMaxSteps = 1 << 20;
@@ -49,6 +54,11 @@ class TreeMarch {
   // tree_march.cpp
   bool march(double t_end);
   int step_over(double a, double t_end);
+  // Whether a ray inside is at the end of bounds, behind which nothing may hold it inside.
+  bool leaving_by_bounds(double a) const {
+    return beyond_ && outside_ && lines_.complement_ends(a);
+  }
+  void leave_by_bounds(double a);
   void advance();
   int sign_over(int leaf, std::vector<int>& signs, TreeSample& a, TreeSample& b);
   int certify(int leaf, const LeafPoint& a, const LeafPoint& b) const;
@@ -70,6 +80,7 @@ class TreeMarch {
   Odds odds(int node, double a);
 
   const ProcessTree* tree_ = nullptr;
+  const ProcessTree* beyond_ = nullptr;
   TreeLines lines_;
   Rng* rng_ = nullptr;
   Counters* counters_ = nullptr;

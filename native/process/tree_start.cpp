@@ -113,7 +113,9 @@ void TreeMarch::engage(int leaf, double a) {
 
 // Draws g at a. The parts of its range are told apart by the signs of its leaves; one is chosen by
 // its probability given F > 0 and all that is known, and g follows the truncated law in it. Noises
-// that are drawn at one point after the other come out jointly.
+// that are drawn at one point after the other come out jointly. Where a ray inside is at the end of
+// bounds it may be outside already (B4): there the draw is free, as that of a leaf was which came
+// to be drawn before.
 void TreeMarch::begin(int noise, double a) {
   Noise& n = lines_.noises[noise];
   lines_.reset_noise(n, a);
@@ -124,7 +126,8 @@ void TreeMarch::begin(int noise, double a) {
   n.line->stretches.push_back({a, a, 0});
   std::vector<Cut> cuts = std::move(cuts_);
   find_cuts(noise, a, cuts);
-  const int part = outside_ && !cuts.empty() ? choose_part(noise, a, p.g, cuts) : -1;
+  const bool given = outside_ && !leaving_by_bounds(a);
+  const int part = given && !cuts.empty() ? choose_part(noise, a, p.g, cuts) : -1;
   if (part >= 0 && deviation > 0) {
     const double low = part > 0 ? cuts[part - 1].g : -kInfinity;
     const double high = part < static_cast<int>(cuts.size()) ? cuts[part].g : kInfinity;

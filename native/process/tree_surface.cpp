@@ -117,6 +117,7 @@ TreeHit TreeSurface::first_hit(March& march, std::span<Line> lines, const Ray& r
   const LineGeometry geometry{to_object.point(ray.origin), to_object.vector(ray.direction)};
   // Leaves are drawn as they are: a ray inside sees their tree inside out (definitions B7).
   const ProcessTree& tree = starts[0].inside ? *inside_out_ : *tree_;
+  const ProcessTree* const beyond = starts[0].inside ? tree_.get() : nullptr;
   const bool kept = memory() == Memory::global;
   const auto keep = [&](bool now) {
     for (std::size_t k = 0; k < lines.size() && kept; ++k)
@@ -129,10 +130,11 @@ TreeHit TreeSurface::first_hit(March& march, std::span<Line> lines, const Ray& r
   };
   keep(true);
   recall(true);
-  const TreeHit hit =
-      tree.has_blends()
-          ? march.blended.first_hit(tree, plans_, geometry, lines, t_max, starts, rng, counters)
-          : march.hard.first_hit(tree, plans_, geometry, lines, t_max, starts, kept, rng, counters);
+  const TreeHit hit = tree.has_blends()
+                          ? march.blended.first_hit(tree, beyond, plans_, geometry, lines, t_max,
+                                                    starts, rng, counters)
+                          : march.hard.first_hit(tree, beyond, plans_, geometry, lines, t_max,
+                                                 starts, kept, rng, counters);
   keep(false);
   recall(false);
   return hit;

@@ -33,8 +33,9 @@ class TreeSurface {
   void stands_alone();
 
   // The first t in (0, t_max) where F changes to F <= 0 (inside: to F >= 0), and the leaf it comes
-  // from. `lines` and
-  // `starts` hold one a leaf; lines hold the sample paths afterwards.
+  // from. A ray inside a tree of several leaves that leaves it by the bounds of one goes on to what
+  // it meets outside, and tells where it left. `lines` and `starts` hold one a leaf; lines hold the
+  // sample paths afterwards.
   struct March {
     TreeMarch hard;
     BlendMarch blended;

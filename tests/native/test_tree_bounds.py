@@ -4,7 +4,7 @@
 import gpis_native as gn
 import numpy as np
 import pytest
-from statistics_checks import check_proportion, check_same_distribution, check_z
+from statistics_checks import check_proportion, check_same_distribution, check_z, normal_cdf
 
 pytestmark = pytest.mark.stats
 
@@ -127,12 +127,12 @@ FLOOR = {
 }
 
 
-def render(tree, material, matrix, seed, *, samples=128, white=False, floor=False):
+def render(tree, material, matrix, seed, *, samples=128, white=False, floor=False, memory="renewal+"):
     """A body from z = 6, under an uneven sky or a white one, over a floor."""
     eye = np.eye(4)
     eye[2, 3] = 6
     leaves = len(tree.leaves) if hasattr(tree, "leaves") else 1
-    body = {"name": "Cut", "type": "gpis", "process": tree, "materials": ["m"] * leaves, "memory": "renewal+", "matrix": matrix}
+    body = {"name": "Cut", "type": "gpis", "process": tree, "materials": ["m"] * leaves, "memory": memory, "matrix": matrix}
     sheet = {"name": "Floor", "type": "mesh", "mesh": "Floor", "materials": ["grey"]}
     description = {
         "version": 1,
@@ -173,3 +173,74 @@ def test_a_ray_in_glass_leaves_the_bounds_of_its_operand(tree, seed):
     check_z(mean, alone, np.hypot(own, error), tree)
     check_z(tree_stats["bounds_exits"], stats["bounds_exits"], 4 * np.sqrt(2 * stats["bounds_exits"]), "exits")  # several a path
     assert stats["bounds_exits"] > 10_000
+
+
+SMOOTH = {"union": gn.union, "smooth union": lambda *parts: gn.smooth_union(*parts, blend=0.05)}
+SOLID = gn.GaussianProcess(-3 * SIGMA, SIGMA, KERNEL, bounds=((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)))
+# Uncertain where the bounds of SOLID end, and beyond them.
+ACROSS = gn.GaussianProcess(gn.SphereField((0.5, 0, 0), 0.3), 0.1, gn.SquaredExponential(0.2))
+
+
+@pytest.mark.parametrize("memory", ["none", "renewal", "renewal+"])
+@pytest.mark.parametrize("kind", SMOOTH)
+def test_glass_that_is_cut_inside_another_leaves_where_nothing_holds_it(kind, memory, seed):
+    """Definitions B4, in a union of which one operand's bounds end where the other is undecided: the order of the operands
+    is nothing, whichever of them was drawn before; a ray leaves without a surface, and enters what comes next from outside."""
+    orders = [(SOLID, ACROSS), (ACROSS, SOLID)]
+    found = [render(SMOOTH[kind](*o), "glass", SHEARED, seed + i, samples=1024, memory=memory) for i, o in enumerate(orders)]
+    (_, mean, error, stats), (_, other, own, other_stats) = found
+    check_z(mean, other, np.hypot(own, error), kind)
+    for name in ("bounds_exits", "path_vertices", "inside_rays"):
+        check_z(stats[name], other_stats[name], 4 * np.sqrt(stats[name] + other_stats[name]), name)
+    assert stats["bounds_exits"] > 1_000
+    assert max(s["line_slope_floor"] for s in (stats, other_stats)) < 1e-4 * stats["path_vertices"]
+
+
+@pytest.mark.parametrize("kind", SMOOTH)
+def test_rays_in_glass_meet_no_surface_on_the_bounds_of_an_operand(kind, n, seed):
+    """The first hits of rays from inside: none lies on the face, and none has a slope that leads in."""
+    origins = np.random.default_rng(seed).uniform(-0.4, 0.4, (n, 3)) * [0, 1, 1] - [0.49, 0, 0]
+    along, value = np.tile([1.0, 0, 0], (n, 1)), np.full((n, 2), np.nan)
+    found = []
+    for i, order in enumerate([(SOLID, ACROSS), (ACROSS, SOLID)]):
+        start = {"value": value.copy(), "gradient": np.full((n, 2, 3), np.nan)}
+        start["value"][:, i], start["gradient"][:, i] = -2 * SIGMA, (-0.1, 0, 0)
+        hits = gn.first_hits(SMOOTH[kind](*order), origins, along, 9, seed=seed + i, inside=np.ones(n, bool), start=start)
+        hit = np.isfinite(hits["t"])
+        assert hit.mean() > 0.05 and not np.any(np.abs(hits["position"][hit, 0] - 0.5) < 1e-9)
+        assert np.all(hits["gradient"][hit, 0] > 0)
+        found.append(hits["t"])
+    check_same_distribution(*found, kind)
+
+
+@pytest.mark.parametrize("memory", ["none", "renewal", "renewal+"])
+def test_glass_in_two_pieces_is_glass_in_one(memory, seed):
+    """A solid box as the union of two that lap over: a ray goes from one into the other without an end between."""
+
+    def box(low, high):
+        return gn.GaussianProcess(-6 * SIGMA, SIGMA, KERNEL, bounds=((low, -0.6, -0.6), (high, 0.6, 0.6)))
+
+    whole, pieces = box(-1, 1), [gn.union(box(-1, 0.2), box(-0.1, 1)), gn.union(box(-0.1, 1), box(-1, 0.2))]
+    found = [render(t, "glass", SHEARED, seed + i, samples=1024, floor=True, memory=memory) for i, t in enumerate([whole, *pieces])]
+    _, mean, error, stats = found[0]
+    for _, other, own, other_stats in found[1:]:
+        check_z(other, mean, np.hypot(own, error), memory)
+        for name in ("bounds_exits", "path_vertices"):
+            check_z(other_stats[name], stats[name], 4 * np.sqrt(2 * stats[name]), name)
+
+
+def test_a_leaf_is_drawn_with_what_it_matters_with(n, seed):
+    """C7 within a union: of max(a, b) where a's bounds begin later than b's, b is drawn with a, not before: P(b > 0) given
+    max(a, b) > 0, whatever the order. The other part of the union is being marched all the way."""
+    level = -0.5 * SIGMA
+    a = gn.GaussianProcess(level, SIGMA, KERNEL, bounds=((0, -1, -1), (1, 1, 1)))
+    b = gn.GaussianProcess(level, SIGMA, KERNEL, bounds=BOX)
+    around = gn.GaussianProcess(3 * SIGMA, SIGMA, KERNEL, bounds=((-2, -2, -2), (2, 2, 2)))
+    origins, along = np.tile([-3.0, 0, 0], (n, 1)), np.tile([1.0, 0, 0], (n, 1))
+    p = normal_cdf(-0.5)
+    for i, order in enumerate([(a, b), (b, a)]):
+        tree = gn.union(around, gn.intersection(*order))
+        first = gn.line_values(tree, origins, along, np.array([3.0 + 1e-9, 5.0]), seed=seed + i)[:, 0, 1]
+        first = first[np.isfinite(first)]
+        assert len(first) > 0.9 * n
+        check_proportion((first > 0).sum(), len(first), p / (1 - (1 - p) ** 2), 0, f"order {i}")
