@@ -189,7 +189,7 @@ def test_level_set_file_is_the_surface(tmp_path, seed):
     gn.write_vdb(path, grid)
     surface = gn.GaussianProcess(gn.VdbField(path, "realisation"), 0, gn.SquaredExponential(0.2))
     rng = np.random.default_rng(seed)
-    origins = np.column_stack([rng.uniform(-0.4, 0.4, (200, 2)), np.full(200, 2.0)])
+    origins = np.column_stack([rng.uniform(-0.25, 0.25, (200, 2)), np.full(200, 2.0)])
     hits = gn.first_hits(surface, origins, np.tile([0.0, 0, -1], (200, 1)), 10)
     assert np.isfinite(hits["t"]).all()
     at = gp.realisation_at(hits["position"], seed)
