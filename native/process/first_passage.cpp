@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
-#include <mutex>
 
+#include "core/lock_or_stop.h"
 #include "field/constant_field.h"
 #include "kernel/stationary_kernel.h"
 #include "process/line_impl.h"
@@ -183,12 +183,13 @@ std::shared_ptr<const FirstPassage> FirstPassage::make(const Radial& radial, dou
     double level, longest, missed_root;
     std::shared_ptr<const FirstPassage> table;
   };
-  static std::mutex mutex;
+  static std::timed_mutex mutex;
   static std::deque<Kept> kept;
   constexpr std::size_t kMostKept = 4;
   Excursions drawn;
   drawn.longest = drawn_to(radial, level, longest);
-  const std::lock_guard lock(mutex);
+  const auto lock = lock_or_stop(mutex, stop);
+  if (!lock) return nullptr;
   for (const Kept& k : kept)
     if (k.radial.family == radial.family && k.radial.alpha == radial.alpha && k.level == level &&
         k.longest == drawn.longest && k.missed_root == missed_root)

@@ -1,9 +1,7 @@
 // First hits out of a table, nothing marched (process/first_passage.h): for a constant mean and
 // deviation and one radial correlation. A line knows the place and the slope of its end and nothing
 // of the way to it: it serves rays that end on this surface alone.
-#include <atomic>
-#include <mutex>
-
+#include "core/lock_or_stop.h"
 #include "field/check.h"
 #include "process/first_passage.h"
 #include "process/plan.h"
@@ -84,7 +82,8 @@ class FirstPassageSampler final : public LineSampler {
   // Drawn when the first ray asks for it. Null: the render was cancelled meanwhile.
   const FirstPassage* table(const std::atomic<bool>* stop) const {
     if (const FirstPassage* ready = ready_.load(std::memory_order_acquire)) return ready;
-    const std::lock_guard lock(mutex_);
+    const auto lock = lock_or_stop(mutex_, stop);
+    if (!lock) return nullptr;
     if (!table_) table_ = FirstPassage::make(line_.radial, level_, longest_, missed_root_, stop);
     ready_.store(table_.get(), std::memory_order_release);
     return table_.get();
@@ -92,7 +91,7 @@ class FirstPassageSampler final : public LineSampler {
 
   RadialLine::Plan line_;
   double level_, longest_, missed_root_, correlation_error_;
-  mutable std::mutex mutex_;
+  mutable std::timed_mutex mutex_;
   mutable std::shared_ptr<const FirstPassage> table_;
   mutable std::atomic<const FirstPassage*> ready_ = nullptr;
 };

@@ -1,5 +1,7 @@
 """Renders whose hits come out of tables of first passages: the light of marched ones, and where they are taken."""
 
+import threading
+
 import gpis_native as gn
 import numpy as np
 import pytest
@@ -155,3 +157,27 @@ def test_a_render_cancelled_while_a_table_is_drawn_ends_and_the_next_draws_it(se
     assert tabulated(description)
     twice = [gn.render(gn.Scene(description), 8, 8, samples=16, seed=seed, threads=t).passes["combined"] for t in (1, 2)]
     assert np.array_equal(*twice)
+
+
+def test_a_render_that_waits_for_the_table_of_another_can_be_cancelled(seed):
+    """Tables are drawn one at a time: the second render ends while the first, which goes on till then, is still drawing."""
+    first_begun, second_done, results = threading.Event(), threading.Event(), {}
+
+    def run(name, level, going_on):
+        process = gn.GaussianProcess(level, 0.01, gn.Matern(1.5, 0.1), bounds=((-0.5,) * 3, (0.5,) * 3))
+        description = scene(process, settings={"missed_root": 5e-4})
+        results[name] = gn.render(gn.Scene(description), 8, 8, samples=10**6, seed=seed, progress=going_on, threads=1)
+
+    def first(fraction, stats):
+        first_begun.set()
+        return not second_done.is_set()
+
+    thread = threading.Thread(target=run, args=("first", 0.00111, first))
+    thread.start()
+    assert first_begun.wait(60)
+    run("second", 0.00222, lambda fraction, stats: False)
+    second_done.set()
+    thread.join(60)
+    assert not thread.is_alive()
+    for result in results.values():
+        assert result is None or result.stats["line_tabulated"] == 0
