@@ -110,6 +110,32 @@ def test_a_segments_values_have_the_covariance_of_the_process():
         assert weights @ gram @ weights + left**2 == pytest.approx(1, abs=1e-6)
 
 
+def test_the_first_negative_value_is_a_hit_by_the_line_before_it():
+    """The first point itself is taken as not below 0, as the paper's renderer takes it."""
+    t = np.array([0.0, 1.0, 3.0, 4.0])
+    f = np.array([[1, -1, 1, -1], [-1, 0.5, 0.2, -0.2], [3, 2, 1, 0], [-1, -2, 1, 1.0]])
+    row, distance, slope = published.first_hit(f, t)
+    np.testing.assert_array_equal(row, [0, 1, 3])
+    np.testing.assert_allclose(distance, [0.5, 3.5, 0])
+    np.testing.assert_allclose(slope, [-2, -0.4, -2])
+
+
+def test_a_ray_goes_on_with_the_value_and_the_slope_it_had():
+    """Where points are close, values leave no doubt of the slope: it is their backward difference, to the order of that."""
+    rng, step, n = np.random.default_rng(4), 0.05, 500
+    pattern = published.pattern(published.Setting(30, step), 0.5)
+    origins, directions = counted.camera_rays(rng, n)
+    rest = {"gradient": np.zeros((n, 3)), "travelled": np.zeros(n), "weight": np.ones(n), "pixel": np.zeros(n, int)}
+    rays = published.Rays(at=origins, direction=directions, value=np.linalg.norm(origins, axis=1) - 1, slope=np.zeros(n), **rest)
+    f, g = published.segment(rng, rays, pattern, True)
+    on = published.gone_on(rng, rays, f, g, pattern)
+    np.testing.assert_array_equal(on.value, f[:, -1])
+    np.testing.assert_allclose(on.at, origins + STANDARD_LENGTH * pattern.at[-1] * directions)
+    differences = np.gradient(f, STANDARD_LENGTH * pattern.at, axis=1, edge_order=2)[:, -1]
+    assert np.std(differences) > 0.4  # σ/ℓ is .5
+    assert np.sqrt(np.mean((on.slope - differences) ** 2)) < 0.02
+
+
 @pytest.mark.parametrize("name", SPHERES)
 def test_the_bench_has_the_papers_settings_as_methods(name):
     scene = SPHERES[name]
