@@ -65,7 +65,9 @@ def fine_pattern(points, step):
     return published.Pattern(at, entering, (known, published.square_root(gram - known @ known.T)), None)
 
 
-@pytest.mark.parametrize(("kind", "batches", "expected", "its_error"), [("camera", 20, 0.0021, 0.0002), ("leaving", 40, 0.055, 0.005)])
+@pytest.mark.parametrize(
+    ("kind", "batches", "expected", "its_error"), [("camera", 20, 0.0021, 0.0002), ("leaving", 40, 0.055, 0.005)]
+)
 def test_missed_roots_are_those_of_the_independent_count(kind, batches, expected, its_error):
     """`./dev bench published` (paths as white noise under a Gaussian, no factorisation) says what share of the rays that hit
     show no root at every .46 length scales. The copy's own segments, looked at so, say the same within four standard errors."""
