@@ -162,10 +162,13 @@ def test_seconds_are_those_of_the_papers_renderer(monkeypatch):
 
 
 def test_equal_time_is_floor_and_variance_over_ours():
-    ours = {"key": "default", "group": "sampler", "found": {"floor": 0.0, "cost": 1e-4}}
+    """And what is below the error of our own bias is not called measured."""
+    ours = {"key": "default", "group": "sampler"}
+    ours["found"] = {"floor": 0.0, "cost": 1e-4, "bias": {"squared": 0.0, "squared_error": 2e-6}}
     paper = {"key": "published_8", "group": "published", "title": "p"}
     paper["found"] = {"floor": 0.0, "cost": 6e-3, "bias": {"squared": 2e-5, "squared_error": 1e-6}}
-    ((title, pairs),) = report.equal_time({"rows": [ours, paper]})
+    ((title, points),) = report.equal_time({"rows": [ours, paper]})
     assert title == "p"
-    np.testing.assert_allclose([p[0] for p in pairs], [60 + 0.2 * s for s in report.PAPER_SECONDS])
-    np.testing.assert_allclose([p[1] for p in pairs], [0.01 * s for s in report.PAPER_SECONDS])
+    np.testing.assert_allclose([p[0] for p in points], [60 + 0.2 * s for s in report.PAPER_SECONDS])
+    np.testing.assert_allclose([p[1] for p in points], [0.01 * s for s in report.PAPER_SECONDS])
+    assert [p[2] for p in points] == [s <= 50 for s in report.PAPER_SECONDS]
