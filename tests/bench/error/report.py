@@ -4,10 +4,9 @@ import html
 import math
 
 from . import plots
-from .analysis import ratio_at_equal_error, ratio_at_equal_time
+from .analysis import PAPER_SECONDS, equal_time, ratio_at_equal_error, ratio_at_equal_time
 
 EQUAL_SECONDS, EQUAL_ERROR = 1.0, 0.05  # the ratios are those at a second, and at 5 % of noise
-PAPER_SECONDS = (1, 10, 100, 1000, 10000)  # of one core, at which the paper's method is compared
 ASKED_AT_EQUAL_TIME = 300
 CALIBRATED = (0.8, 1.25)
 STYLE = """
@@ -175,25 +174,6 @@ def counts_table(found):
         for r in rows
     ]
     return table(columns, body)
-
-
-def equal_time(found):
-    """Of each of the paper's settings: title, and at PAPER_SECONDS its relMSE over the default's, the standard error that its
-    squared bias gives that, and whether it is measured: where the default's variance is below the error of its own squared
-    bias, the ratio rests on its having none. The paper's squared bias is taken as measured, not only where it is certain."""
-    base = next((r["found"] for r in found["rows"] if r["key"] == "default" and "found" in r), None)
-    rows = []
-    for row in found["rows"]:
-        if row["group"] != "published" or "found" not in row or base is None:
-            continue
-        b = row["found"]["bias"]
-        taken = row["found"] | {"floor": max(b["squared"], 0.0)}
-        points = []
-        for seconds in PAPER_SECONDS:
-            ours, error = base["floor"] + base["cost"] / seconds, base["bias"]["squared_error"]
-            points.append((ratio_at_equal_time(taken, base, seconds), b["squared_error"] / ours, ours >= error))
-        rows.append((row["title"], points))
-    return rows
 
 
 def equal_time_text(ratio, error, is_measured):
