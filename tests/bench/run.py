@@ -2,8 +2,9 @@
 
 A benchmark is a function bench_*() in a file bench_*.py here; one that has parameters `quick` and `again` gets these options:
 less of everything, and nothing taken from an earlier run. It measures and returns one row (a dict of column to
-number or text) or a list of rows. The table goes to the screen, everything to out/bench/results.json. Times are for
-people to compare on one machine; no test depends on them.
+number or text) or a list of rows. The table goes to the screen, with the ratios to its last one; out/bench/results.json keeps
+the last rows of every benchmark and is written after each. Times are for people to compare on one machine; no test
+depends on them.
 """
 
 import importlib.util
@@ -16,6 +17,7 @@ import time
 from pathlib import Path
 
 import gpis_native as gn
+import results
 from error.runner import processor_seconds
 
 HERE = Path(__file__).parent
@@ -49,8 +51,10 @@ def main(arguments):
     if unknown := set(options) - {"quick", "again"}:
         sys.exit(f"there is no option --{min(unknown)}; there are --quick and --again")
     wanted = [a for a in arguments if not a.startswith("--")]
-    results = {"machine": {"processor": platform.processor() or platform.machine(), "threads": os.cpu_count()}}
-    results |= {"build": gn.build_info(), "benchmarks": {}}
+    conditions = {"processor": platform.processor() or platform.machine(), "threads": os.cpu_count(), "build": gn.build_info()}
+    conditions["quick"] = "quick" in options
+    OUT.mkdir(parents=True, exist_ok=True)
+    known, found = results.load(OUT / "results.json"), False
     for name, function in discover():
         if wanted and not any(part in name for part in wanted):
             continue
@@ -61,11 +65,13 @@ def main(arguments):
         rows = [rows] if isinstance(rows, dict) else rows
         print(f"{name} ({time.perf_counter() - start:.1f} s, {processor_seconds() - spent:.1f} s of the processor)", flush=True)
         print_table(rows)
-        results["benchmarks"][name] = rows
-    if not results["benchmarks"]:
+        if beside := results.ratios(rows, known, name, conditions["quick"]):
+            print(f"  now / {known['measured'][name]['day']}:")
+            print_table(beside)
+        known, found = results.kept(known, name, rows, conditions | {"day": time.strftime("%Y-%m-%d %H:%M")}), True
+        (OUT / "results.json").write_text(json.dumps(known, indent=1) + "\n")
+    if not found:
         sys.exit("there is no such benchmark" if wanted else "there is no benchmark in tests/bench yet")
-    OUT.mkdir(parents=True, exist_ok=True)
-    (OUT / "results.json").write_text(json.dumps(results, indent=1) + "\n")
 
 
 if __name__ == "__main__":

@@ -3,6 +3,8 @@ difference / (mean² + .01), on luminance."""
 
 import numpy as np
 
+PAPER_SECONDS = (1, 10, 100, 1000, 10000)  # of one core, at which the paper's method is compared
+
 
 def weights(reference):
     return 1 / (reference**2 + 0.01)
@@ -76,6 +78,25 @@ def evaluate(cell, images, reference, reference_variance):
 def ratio_at_equal_time(method, default, seconds):
     """relMSE of the method over that of the default after the same seconds of the processor."""
     return (method["floor"] + method["cost"] / seconds) / (default["floor"] + default["cost"] / seconds)
+
+
+def equal_time(found):
+    """Of each of the paper's settings: title, and at PAPER_SECONDS its relMSE over the default's, the standard error that its
+    squared bias gives that, and whether it is measured: where the default's variance is below the error of its own squared
+    bias, the ratio rests on its having none. The paper's squared bias is taken as measured, not only where it is certain."""
+    base = next((r["found"] for r in found["rows"] if r["key"] == "default" and "found" in r), None)
+    rows = []
+    for row in found["rows"]:
+        if row["group"] != "published" or "found" not in row or base is None:
+            continue
+        b = row["found"]["bias"]
+        taken = row["found"] | {"floor": max(b["squared"], 0.0)}
+        points = []
+        for seconds in PAPER_SECONDS:
+            ours, error = base["floor"] + base["cost"] / seconds, base["bias"]["squared_error"]
+            points.append((ratio_at_equal_time(taken, base, seconds), b["squared_error"] / ours, ours >= error))
+        rows.append((row["title"], points))
+    return rows
 
 
 def ratio_at_equal_error(method, default, relmse):

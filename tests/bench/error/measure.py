@@ -10,7 +10,9 @@ from dataclasses import dataclass
 import gpis_native as gn
 import numpy as np
 
+from . import published
 from .methods import default, methods_of, reference_of
+from .rates import paper_sphere_rate
 from .scenes import SCENES
 
 LUMINANCE = np.array((0.2126, 0.7152, 0.0722))
@@ -33,10 +35,11 @@ class Effort:
     largest: int  # samples per pixel
     repeats: int
     default_repeats: int  # of the default method: those of the calibration
+    published_repeats: int  # of the copy of the paper's sampler: its bias is small, and what is asked
 
 
-FULL = Effort("full", 24, 12, 5.0, 200.0, 128, 6, 30)
-QUICK = Effort("quick", 16, 4, 0.4, 6.0, 32, 3, 12)
+FULL = Effort("full", 24, 12, 5.0, 200.0, 128, 6, 30, 40)
+QUICK = Effort("quick", 16, 4, 0.4, 6.0, 32, 3, 12, 3)
 SLOW = ("painted", "everything")
 
 
@@ -67,6 +70,13 @@ def rate(description, size, seconds):
     return paths / spent
 
 
+def doubled(largest):
+    steps = [BLOCK]
+    while 2 * steps[-1] <= largest:
+        steps.append(2 * steps[-1])
+    return steps
+
+
 def budgets(scene, method, effort, folder, planned):
     """Samples per pixel: powers of two times 16 that the cell's seconds and its reference's seconds allow."""
     size = size_of(scene, effort)
@@ -76,14 +86,42 @@ def budgets(scene, method, effort, folder, planned):
     reference_speed = rate(reference, size, 0.05 * effort.seconds)
     pixels = size * size
     allowed = min(effort.seconds * speed / (repeats * pixels), effort.reference_seconds * reference_speed / (100 * pixels))
-    steps = [BLOCK]
-    while 2 * steps[-1] <= min(allowed, effort.largest):
-        steps.append(2 * steps[-1])
-    return steps, repeats
+    return doubled(min(allowed, effort.largest)), repeats
+
+
+def measure_published(scene, method, effort):
+    """The same of the paper's sampler: its pictures by our copy of its method, its seconds by the rate of its renderer."""
+    rate = paper_sphere_rate()
+    if rate is None:
+        return {"refused": "its rate is in baseline.json of the shared data, which is not beside this checkout"}, None
+    setting, size, steps = published.SETTINGS[method.key][1], size_of(scene, effort), doubled(effort.largest)
+    images = np.zeros((effort.published_repeats, len(steps), size, size))
+    counters, start = dict.fromkeys(COUNTERS, 0), time.process_time()
+    for k in range(len(images)):
+        total = np.zeros((size, size))
+        for b, samples in enumerate(steps):
+            more = samples - (steps[b - 1] if b else 0)
+            total += more * published.picture(scene.name, setting, size, more, (k, b), counters)
+            images[k, b] = total / samples
+    paths = len(images) * steps[-1] * size * size
+    cell = {
+        "samples": steps,
+        "size": size,
+        "repeats": len(images),
+        "seconds": [[samples * size * size / rate for samples in steps]] * len(images),
+        "copy_seconds": time.process_time() - start,
+        "setup_seconds": None,
+        "paths_per_second": rate,
+        "per_path": {name: count / paths for name, count in counters.items()},
+        "memory_mb": None,
+    }
+    return cell, images
 
 
 def measure(scene, method, effort, folder):
     """The cell as a dict for .json, and luminance (repeats, budgets, H, W)."""
+    if method.group == "published":
+        return measure_published(scene, method, effort)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     start = time.process_time()
     try:

@@ -1,6 +1,9 @@
-"""What is compared on a scene: samplers of the same law, memory models, and the mean surface with a rough micro-BRDF."""
+"""What is compared on a scene: samplers of the same law, memory models, the mean surface with a rough micro-BRDF, and a copy of
+the paper's dense sampler with the paper's settings."""
 
 from dataclasses import dataclass
+
+from . import published
 
 SAMPLERS = ("convolution", "markov", "spectral", "nystrom", "dense", "realisation")
 MEMORIES = ("none", "renewal", "renewal+", "global-1", "global-3", "global")
@@ -11,7 +14,9 @@ DEFAULT_MEMORY = "renewal+"
 class Method:
     key: str
     title: str
-    group: str  # "sampler": the law of Renewal+; "truth": an approximation, measured against memory global
+    # "sampler": the law of Renewal+; "published": an approximation of it, no render of ours (published.py); "truth": an
+    # approximation, measured against memory global.
+    group: str
     sampler: str = "auto"
     memory: str = DEFAULT_MEMORY
     microfacet: bool = False
@@ -31,6 +36,8 @@ def methods_of(scene):
     methods = [default(scene)]
     if scene.methods:
         methods += [Method(s, s, "sampler", sampler=s) for s in SAMPLERS if s != scene.default]
+    if scene.name in published.SCENES:
+        methods += [Method(key, title, "published") for key, (title, _) in published.SETTINGS.items()]
     if scene.memories:
         methods += [Method(f"memory_{m}", f"memory {m}", "truth", memory=m) for m in MEMORIES]
     if scene.microfacet:

@@ -13,7 +13,7 @@ COLORS = {
     "default": "#1f5fa8", "convolution": "#1f5fa8", "markov": "#6a51a3", "spectral": "#2a9d6f", "nystrom": "#d1861b",
     "dense": "#444444", "realisation": "#b8336a", "memory_none": "#c0392b", "memory_renewal": "#e08e0b",
     "memory_renewal+": "#1f5fa8", "memory_global-1": "#2a9d6f", "memory_global-3": "#117a65", "memory_global": "#b8336a",
-    "microfacet": "#7f8c8d", "paper": "#000000",
+    "microfacet": "#7f8c8d", "published_8": "#c0392b", "published_16": "#000000", "published_32": "#8c6d31",
 }  # fmt: skip
 STYLE = {
     "font.size": 9, "font.family": "sans-serif", "axes.spines.top": False, "axes.spines.right": False,
@@ -58,9 +58,9 @@ def guide(axes):
     axes.set_ylim(y0, y1)
 
 
-def error_panel(axes, rows, title, paper=None):
-    """rows: (key, title, evaluation). Points: error; thin line: the part that is variance; dotted: the bias floor. paper:
-    (seconds, error) of the paper's renderer."""
+def error_panel(axes, rows, title):
+    """rows: (key, title, evaluation). Points: error; thin line: the part that is variance; dotted: the bias floor; dashed: the
+    paper's method, whose seconds are by the rate of its renderer."""
     for key, label, found in rows:
         color, seconds = COLORS.get(key, "#333333"), np.array(found["seconds"])
         relmse, spread = np.array(found["relmse"]), np.array(found["relmse_error"])
@@ -70,13 +70,11 @@ def error_panel(axes, rows, title, paper=None):
         high = np.sqrt(relmse.clip(0) + 2 * spread) - error
         axes.errorbar(
             seconds[shown], error[shown], yerr=[low[shown], high[shown]], color=color, marker="o", ms=3.5, lw=1.5,
-            elinewidth=0.8, label=label,
+            elinewidth=0.8, label=label, ls="--" if key.startswith("published") else "-",
         )  # fmt: skip
         axes.plot(seconds, np.sqrt(found["variance"]), color=color, lw=0.7, ls="-", alpha=0.5)
         if found["floor"] > 0:
             axes.axhline(np.sqrt(found["floor"]), color=color, lw=0.9, ls=":")
-    if paper:
-        axes.plot(*paper, color=COLORS["paper"], lw=1, ls="--", marker="s", ms=3, label="paper's renderer (its rate, this variance)")
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_title(title, loc="left")
@@ -101,13 +99,13 @@ def bias_panel(axes, rows, title):
     axes.set_title(title, loc="left")
 
 
-def scene_plot(samplers, approximations, paper=None, png=None):
+def scene_plot(samplers, approximations, png=None):
     """samplers, approximations: lists of (key, title, evaluation); a column for each that is not empty."""
     with plt.rc_context(STYLE):
         panels = 1 + bool(approximations)
         width = 4.4 * panels + 3.3
         figure, axes = plt.subplots(1, panels + 1, figsize=(width, 3.3), width_ratios=[4.4] * panels + [2.4], squeeze=False)
-        error_panel(axes[0, 0], samplers, "Error against time", paper)
+        error_panel(axes[0, 0], samplers, "Error against time")
         if approximations:
             error_panel(axes[0, 1], approximations, "Approximations, against memory global")
         bias_panel(axes[0, -1], samplers + approximations, "Bias")

@@ -31,6 +31,12 @@ def baseline():
     return json.loads(path.read_text()) if path.exists() else None
 
 
+def paper_sphere_rate():
+    """Paths per second of the processor of the paper's renderer on the standard sphere, memory Renewal+; None without its file."""
+    known = baseline()
+    return known and known["standard_sphere"]["samples_per_cpu_second"]["renewal+"]
+
+
 def yardstick():
     """A fixed loop of numpy: exponentials per second, so that machines compare."""
     x, best = np.linspace(0, 1, 1_000_000), np.inf
@@ -62,7 +68,7 @@ def measure_rates(repetitions, missing):
         if known and key:
             paper = EXAMPLE_PATHS / known["example_scenes_128x128_8_samples"][key]["cpu_seconds"]
         elif known:
-            paper = known["standard_sphere"]["samples_per_cpu_second"]["renewal+"]
+            paper = paper_sphere_rate()
         rows.append({"name": name, "rate": best_rate(make, repetitions), "paper": paper, "asked": asked})
     return rows
 
