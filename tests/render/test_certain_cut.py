@@ -115,7 +115,7 @@ def test_light_is_that_of_the_march_together(name, memory, seed, full_size):
         results = [
             gn.render(
                 gn.Scene(scene(t, material=material, memory=memory, matrix=MATRICES[place])),
-                10, 10, samples=1024 if full_size else 256, seed=seed + k,
+                10, 10, samples=512 if full_size else 256, seed=seed + k,
             )
             for k, t in enumerate(trees)
         ]  # fmt: skip
