@@ -17,6 +17,8 @@ class BoxField final : public Field {
     check_positive("BoxField: size", size);
   }
 
+  const Vec3& center() const { return center_; }
+  const Vec3& half() const { return half_; }
   double value(const Vec3& p) const override { return sample(p).value; }
   FieldSample sample(const Vec3& p) const override;
   Range range() const override { return {-smallest_half(), kInfinity}; }

@@ -16,6 +16,8 @@ class PlaneField final : public Field {
     check_direction("PlaneField: normal", normal);
   }
 
+  const Vec3& point() const { return point_; }
+  const Vec3& gradient() const { return gradient_; }
   double value(const Vec3& p) const override { return dot(gradient_, p - point_); }
   FieldSample sample(const Vec3& p) const override { return {value(p), gradient_}; }
   Range range() const override { return lipschitz() > 0 ? Range{} : Range{0, 0}; }

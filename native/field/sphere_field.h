@@ -13,6 +13,8 @@ class SphereField final : public Field {
     check_positive("SphereField: radius", radius);
   }
 
+  const Vec3& center() const { return center_; }
+  double radius() const { return radius_; }
   double value(const Vec3& p) const override { return length(p - center_) - radius_; }
   FieldSample sample(const Vec3& p) const override {
     const Vec3 q = p - center_;

@@ -12,6 +12,8 @@ class TransformedField final : public Field {
   // support() would be a surface of its own.
   TransformedField(FieldPtr field, const Affine& matrix);
 
+  const Field& field() const { return *field_; }
+  const Affine& to_field() const { return inverse_; }
   double value(const Vec3& p) const override { return field_->value(inverse_.point(p)); }
   FieldSample sample(const Vec3& p) const override {
     return pull_back(field_->sample(inverse_.point(p)));

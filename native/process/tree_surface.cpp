@@ -62,15 +62,26 @@ TreeSurface::TreeSurface(TreePtr tree, const Affine& object_to_world, Memory mem
   }
   for (const ProcessSurface& leaf : leaves_) plans_.push_back(&leaf.planned());
   bounds_ = box_of(*tree_, tree_->root(), leaves_);
+  cut_ = CertainCut::of(*tree_, leaves_, memory, sampler, uncut_);
 }
 
 void TreeSurface::serve_inside() {
   if (tree_->is_single()) leaves_[0].serve_inside();
+  if (!cut_) return;
+  cut_.reset();
+  uncut_ = "a cut takes bodies that no ray travels in";
 }
 
 void TreeSurface::stands_alone() {
+  if (!tree_->is_single()) return cut_->stands_alone(leaves_);
   leaves_[0].stands_alone();
   plans_[0] = &leaves_[0].planned();
+}
+
+void TreeSurface::has_company(const std::string& name) {
+  if (!cut_) return;
+  cut_.reset();
+  uncut_ = "a cut takes an object of its own, and '" + name + "' reaches into its bounds";
 }
 
 bool TreeSurface::leaves_bounds(const Ray& ray, double t) const {
@@ -115,6 +126,9 @@ TreeHit TreeSurface::first_hit(March& march, std::span<Line> lines, const Ray& r
   }
   const Affine& to_object = leaves_[0].world_to_object();
   const LineGeometry geometry{to_object.point(ray.origin), to_object.vector(ray.direction)};
+  if (cut_ && !starts[0].inside)
+    if (const auto hit = cut_->first_hit(leaves_, geometry, lines, t_max, starts, rng, counters))
+      return *hit;
   // Leaves are drawn as they are: a ray inside sees their tree inside out (definitions B7).
   const ProcessTree& tree = starts[0].inside ? *inside_out_ : *tree_;
   const ProcessTree* const beyond = starts[0].inside ? tree_.get() : nullptr;
@@ -144,14 +158,20 @@ std::vector<std::pair<std::string, std::string>> TreeSurface::plan() const {
   if (leaves_.size() == 1 && tree_->is_single()) return leaves_[0].plan();
   std::vector<std::pair<std::string, std::string>> rows;
   const bool shared = tree_->noises() < static_cast<int>(leaves_.size());
-  rows.emplace_back("composition",
-                    tree_->describe() + ", composed per realisation; noise " +
-                        (shared ? "shared by some leaves" : "independent") +
-                        (independent_union_ ? "; every leaf marched for itself, the first hit wins"
-                         : tree_->has_blends()
-                             ? "; leaves marched together, all that are within the blend radii of "
-                               "the surface (skipping is bounded by them)"
-                             : "; leaves marched together"));
+  rows.emplace_back(
+      "composition",
+      tree_->describe() + ", composed per realisation; noise " +
+          (shared ? "shared by some leaves" : "independent") +
+          (independent_union_ ? "; every leaf marched for itself, the first hit wins"
+           : tree_->has_blends()
+               ? "; leaves marched together, all that are within the blend radii of "
+                 "the surface (skipping is bounded by them)"
+           : cut_ ? "; " + cut_->describe()
+                  : "; leaves marched together" + (uncut_.empty() ? "" : " (" + uncut_ + ")")));
+  if (cut_) {
+    const auto cut = cut_->plan();
+    rows.insert(rows.end(), cut.begin(), cut.end());
+  }
   for (std::size_t i = 0; i < leaves_.size(); ++i)
     for (const auto& [key, text] : leaves_[i].plan())
       rows.emplace_back("leaf[" + std::to_string(i) + "]." + key, text);

@@ -1,10 +1,11 @@
 // A tree of processes placed in the world and planned for rendering: its leaves are ProcessSurfaces
 // that share one place, one memory model and one march. A tree of one leaf is that leaf and keeps
 // the march of its own; so do the leaves of a plain union of independent ones, whose first hit is
-// the first of theirs (definitions B5).
+// the first of theirs (definitions B5), and one random leaf that certain ones cut (certain_cut.h).
 #pragma once
 
 #include "process/blend_march.h"
+#include "process/certain_cut.h"
 #include "process/surface.h"
 
 namespace gpis {
@@ -28,9 +29,12 @@ class TreeSurface {
 
   // Plans rays that travel inside the body too; before the first of them.
   void serve_inside();
-  // As ProcessSurface's; a tree of several leaves marches them, whatever else there is.
-  bool gains_alone() const { return tree_->is_single() && leaves_[0].gains_alone(); }
+  // As ProcessSurface's; and a tree that certain leaves cut gains: a ray that ends on something
+  // else would remember what a march of all leaves had drawn of them there.
+  bool gains_alone() const { return tree_->is_single() ? leaves_[0].gains_alone() : bool(cut_); }
   void stands_alone();
+  // It does not: the object of that name reaches into the bounds.
+  void has_company(const std::string& name);
 
   // The first t in (0, t_max) where F changes to F <= 0 (inside: to F >= 0), and the leaf it comes
   // from. A ray inside a tree of several leaves that leaves it by the bounds of one goes on to what
@@ -49,6 +53,8 @@ class TreeSurface {
   TreePtr tree_, inside_out_;
   bool independent_union_;
   std::vector<ProcessSurface> leaves_;
+  std::optional<CertainCut> cut_;
+  std::string uncut_;  // why there is none
   std::vector<const PlannedLine*> plans_;
   Box3 bounds_;
 };

@@ -53,6 +53,8 @@ void find_alone(const SceneDescription& description, Scene::Impl& scene) {
       throw std::invalid_argument((path + ".sampler") +
                                   ": first_passage serves an object of its own, and '" + *other +
                                   "' reaches into its bounds: take 'auto'.");
+    } else {
+      body.surface.has_company(*other);
     }
   }
 }
