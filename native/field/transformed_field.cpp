@@ -1,5 +1,8 @@
 #include "field/transformed_field.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "core/box_image.h"
 #include "field/check.h"
 #include "field/constant_field.h"
@@ -8,16 +11,30 @@
 namespace gpis {
 namespace {
 
+// What is no part of what products of rotations leave of zeros: a few ulp of what else stands in
+// the row and in the column.
+bool counts(const Mat3& m, int i, int j) {
+  double row = 0, column = 0;
+  for (int k = 0; k < 3; ++k) {
+    row = std::max(row, std::abs(m.row[i][k]));
+    column = std::max(column, std::abs(m.row[k][j]));
+  }
+  return std::abs(m.row[i][j]) > 1e-15 * std::min(row, column);
+}
+
 // True if every axis goes to an axis.
 bool keeps_axes(const Mat3& m) {
   int entries = 0;
-  for (const Vec3& row : m.row)
-    for (int i = 0; i < 3; ++i) entries += row[i] != 0;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) entries += counts(m, i, j);
   return entries == 3;
 }
 
+// To itself, in its own direction.
 bool stretches_axes(const Mat3& m) {
-  return keeps_axes(m) && m.row[0].x > 0 && m.row[1].y > 0 && m.row[2].z > 0;
+  for (int i = 0; i < 3; ++i)
+    if (!(counts(m, i, i) && m.row[i][i] > 0)) return false;
+  return keeps_axes(m);
 }
 
 }  // namespace

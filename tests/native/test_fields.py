@@ -90,13 +90,20 @@ def test_a_grid_is_its_background_outside():
     assert grid(background=5.0).range[1] == 5.0
 
 
-def test_a_grid_that_moves_along_its_axes_is_the_grid_that_stands_there():
+@pytest.mark.parametrize("rounding", [0, 6e-17])
+def test_a_grid_that_moves_along_its_axes_is_the_grid_that_stands_there(rounding):
+    """Also where products of rotations leave something of the zeros."""
     scale, shift, x = np.array([0.5, 1.25, 2]), np.array([0.3, -0.1, 0.2]), points()
-    matrix = np.diag([*scale, 1])
+    matrix = np.diag([*scale, 1]) + rounding * np.sign([[0, 1, -1, 0], [1, 0, 1, 0], [-1, 1, 0, 0], [0] * 4])
     matrix[:3, 3] = shift
     process = gn.GaussianProcess(-2 * grid(background=5.0), 0.1, gn.SquaredExponential(0.5)).transformed(matrix)
     there = -2 * gn.GridField(VALUES, VOXEL * scale, ORIGIN * scale + shift, background=5.0)
     assert np.array_equal(process.mean(x), there(x))
+    # Turned by right angles it keeps its background too.
+    turned = gn.GaussianProcess(grid(background=5.0), 0.1, gn.SquaredExponential(0.5)).transformed(
+        [[rounding, -1, 0, 0], [1, rounding, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+    )
+    np.testing.assert_allclose(turned.mean(x), grid(background=5.0)(x @ [[0, -1, 0], [1, 0, 0], [0, 0, 1]]), atol=1e-12)
 
 
 @pytest.mark.parametrize("name", FIELDS)
