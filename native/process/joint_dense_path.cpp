@@ -1,5 +1,8 @@
 #include "process/joint_dense_path.h"
 
+#include <algorithm>
+#include <span>
+
 #include "process/march_sampler.h"
 #include "process/survey.h"
 
@@ -18,29 +21,63 @@ constexpr int kParts = 6;
 // tests/native/test_implied_covariance.cpp.
 constexpr double kElsewhere = 2;
 
+// Through (a, da) at `begin` and (b, db) at `end`, in Bernstein's form.
+void cubic(double begin, double a, double da, double end, double b, double db, double t, double& g,
+           double& dg) {
+  const double h = end - begin, s = (t - begin) / h, r = 1 - s;
+  const double c1 = a + da * h / 3, c2 = b - db * h / 3;
+  g = r * r * r * a + 3 * r * r * s * c1 + 3 * r * s * s * c2 + s * s * s * b;
+  dg = 3 * (r * r * (c1 - a) + 2 * r * s * (c2 - c1) + s * s * (b - c2)) / h;
+}
+
+// Of a cell, of which the rest is a cubic.
+constexpr int kHalvings = 8;
+
+// One of a sum of values and slopes of g.
+struct Part {
+  LocalPoint at;
+  Functional what;
+};
+
+double shared(const Covariance& covariance, std::span<const Part> a, std::span<const Part> b) {
+  double sum = 0;
+  for (const Part& p : a)
+    for (const Part& q : b) sum += covariance.between(p.at, p.what, q.at, q.what);
+  return sum;
+}
+
+// At a fraction s of [a, a + h]: what the cubic through both ends has there, less g.
+std::array<Part, 3> error_of_cubic(const Covariance& covariance, const LineGeometry& line, double a,
+                                   double h, double s) {
+  const double r = 1 - s;
+  const Vec3 d = line.direction;
+  const auto at = [&](double t) { return covariance.at(line.origin + d * t); };
+  return {Part{at(a), {r * r * (1 + 2 * s), d * (r * r * s * h)}}, Part{at(a + s * h), {-1, {}}},
+          Part{at(a + h), {s * s * (1 + 2 * r), d * (-s * s * r * h)}}};
+}
+
+// q of Var(g'(t + h) - g'(t)) = q h + O(h²), 0 of smoother paths. The cubic through values and
+// slopes h apart misses a variance of q h³/192 in the middle, and one of order h⁵ of what has a
+// second derivative: taken off by that of half the interval about the same place.
+double slope_intensity(const Covariance& covariance, const LineGeometry& line, double a, double h) {
+  const auto missed = [&](double begin, double length) {
+    const auto error = error_of_cubic(covariance, line, begin, length, 0.5);
+    return shared(covariance, error, error) / covariance.variance();
+  };
+  const double rough = (32 * missed(a + h / 4, h / 2) - missed(a, h)) / 3;
+  return std::max(0.0, 192 * rough / (h * h * h));
+}
+
 // |implied - exact correlation| of the cubics through values and slopes at points h apart from
 // within one cell to within another and to the points, at most.
 double error_of_cubics(const Covariance& covariance, const SurveyLine& survey, double t, double h) {
   const LineGeometry& line = survey.geometry;
-  struct Part {
-    LocalPoint at;
-    Functional what;
+  const auto error = [&](double a, double s) { return error_of_cubic(covariance, line, a, h, s); };
+  const auto value = [&](double s) {
+    return std::array<Part, 1>{Part{covariance.at(line.origin + line.direction * s), {}}};
   };
-  const Vec3 d = line.direction;
-  const auto at = [&](double s) { return covariance.at(line.origin + d * s); };
-  // The error at a fraction s of a cell: what the cubic has there, less g.
-  const auto error = [&](double a, double s) {
-    const double r = 1 - s;
-    return std::array<Part, 3>{Part{at(a), {r * r * (1 + 2 * s), d * (r * r * s * h)}},
-                               Part{at(a + s * h), {-1, {}}},
-                               Part{at(a + h), {s * s * (1 + 2 * r), d * (-s * s * r * h)}}};
-  };
-  const auto value = [&](double s) { return std::array<Part, 1>{Part{at(s), {}}}; };
-  const auto shared = [&](const auto& a, const auto& b) {
-    double sum = 0;
-    for (const Part& p : a)
-      for (const Part& q : b) sum += covariance.between(p.at, p.what, q.at, q.what);
-    return sum;
+  const auto shared = [&](std::span<const Part> a, std::span<const Part> b) {
+    return gpis::shared(covariance, a, b);
   };
   double largest = 0;
   for (const double s : {0.25, 0.5, 0.75}) {
@@ -86,6 +123,8 @@ JointDensePath::Plan::Plan(const GaussianProcess& process, const Box3& bounds)
 void JointDensePath::reset(const Plan& plan, const LineGeometry& line, double anchor, double t_end,
                            Counters& counters) {
   begin(plan, line, anchor, counters);
+  rests_.clear();
+  counters_ = &counters;
   step_ = 2 * plan.spacing * survey_step(*covariance_, line, anchor, t_end);
 }
 
@@ -115,17 +154,66 @@ void JointDensePath::draw(long index, Rng& rng, Counters& counters) {
 
 void JointDensePath::prepare(long cell, Rng& rng, Counters& counters) {
   draw(cell, rng, counters);
+  const std::size_t left = points_.size() - 1;
   draw(cell + 1, rng, counters);
+  if (covariance_->smooth() || std::isinf(step_) || left + 1 == points_.size()) return;
+  points_[left].intensity =
+      slope_intensity(*covariance_, line_, anchor_ + points_[left].index * step_, step_);
+}
+
+const JointDensePath::Point& JointDensePath::point_of(long cell) const {
+  std::size_t i = points_.size() - 1;
+  while (points_[i].index > cell) --i;
+  return points_[i];
 }
 
 void JointDensePath::at_left(long cell, double& g, double& dg) const {
-  std::size_t i = points_.size() - 1;
-  while (points_[i].index > cell) --i;
-  g = points_[i].g;
-  dg = points_[i].dg;
+  const Point& p = point_of(cell);
+  g = p.g;
+  dg = p.dg;
 }
 
-void JointDensePath::at(long cell, double t, Rng&, double& g, double& dg) const {
+// As DensePath's: 4.5 standard deviations, (B₁+B₂)(½) = ¾, and 5 % for shorter intervals.
+double JointDensePath::deviation(double a, double h) const {
+  if (covariance_->smooth() || std::isinf(step_)) return 0;
+  const Point& p = point_of(static_cast<long>(std::floor((a - anchor_) / step_ + 1e-9)));
+  return 4.5 * 1.05 / 0.75 * std::sqrt(p.intensity * h * h * h / 192);
+}
+
+// An integrated Brownian motion given value and slope at both ends of an interval: the value of its
+// middle has the variance q h³/192, the slope there q h/16, and neither knows of the other.
+void JointDensePath::add_rest(long cell, double t, Rng& rng, double& g, double& dg) {
+  const double intensity = point_of(cell).intensity;
+  if (!(intensity > 0)) return;
+  const double begin = anchor_ + cell * step_;
+  Rest a{begin, 0, 0}, b{begin + step_, 0, 0};
+  if (!(t > a.t && t < b.t)) return;
+  auto right = std::upper_bound(rests_.begin(), rests_.end(), t,
+                                [](double x, const Rest& rest) { return x < rest.t; });
+  if (right != rests_.begin() && (right - 1)->t > a.t) a = *(right - 1);
+  if (right != rests_.end() && right->t < b.t) b = *right;
+  for (double h = b.t - a.t; a.t < t && h > 1.5 * std::ldexp(step_, -kHalvings); h = b.t - a.t) {
+    const Rest middle{
+        a.t + h / 2,
+        (a.g + b.g) / 2 + h * (a.dg - b.dg) / 8 +
+            std::sqrt(intensity * h * h * h / 192) * rng.normal(),
+        1.5 * (b.g - a.g) / h - (a.dg + b.dg) / 4 + std::sqrt(intensity * h / 16) * rng.normal()};
+    counters_->line_normals += 2;
+    right = rests_.insert(right, middle);
+    if (middle.t <= t) {
+      a = middle;
+      ++right;
+    } else {
+      b = middle;
+    }
+  }
+  double rest, slope;
+  cubic(a.t, a.g, a.dg, b.t, b.g, b.dg, t, rest, slope);
+  g += rest;
+  dg += slope;
+}
+
+void JointDensePath::at(long cell, double t, Rng& rng, double& g, double& dg) {
   double a, da, b, db;
   at_left(cell, a, da);
   if (std::isinf(step_)) {
@@ -134,11 +222,9 @@ void JointDensePath::at(long cell, double t, Rng&, double& g, double& dg) const 
     return;
   }
   at_right(cell, b, db);
-  // Bernstein form of the cubic through both ends.
-  const double s = (t - anchor_) / step_ - cell, r = 1 - s;
-  const double c1 = a + da * step_ / 3, c2 = b - db * step_ / 3;
-  g = r * r * r * a + 3 * r * r * s * c1 + 3 * r * s * s * c2 + s * s * s * b;
-  dg = 3 * (r * r * (c1 - a) + 2 * r * s * (c2 - c1) + s * s * (b - c2)) / step_;
+  const double begin = anchor_ + cell * step_;
+  cubic(begin, a, da, begin + step_, b, db, t, g, dg);
+  if (!covariance_->smooth()) add_rest(cell, t, rng, g, dg);
 }
 
 std::unique_ptr<LineSampler> make_joint_dense(const GaussianProcess& process, const Box3& bounds) {

@@ -242,3 +242,29 @@ def test_unsuitable_kernels_get_a_sentence():
     broken = gn.GaussianProcess(0, 1, gn.Matern(0.5, 1), anisotropy=FIELDS["rotating 3:1"], bounds=BOUNDS)
     with pytest.raises(ValueError, match="has no gradient"):
         gn.first_hits(broken, *along(1), 1)
+
+
+@pytest.mark.parametrize("name", ["sum with a rough term", "varying lengths"])
+def test_slopes_of_rough_lines_between_their_rows(name, full_size, seed):
+    """Rows are far apart against a rough path: what lies between them is no polynomial, and differences over a hundredth of a
+    length have the variance of the process wherever they are taken (cubics alone lack 5 to 6 % of it)."""
+    kernel, anisotropy = {
+        "sum with a rough term": (0.6 * gn.SquaredExponential(0.4) + 0.4 * gn.Matern(1.5, 0.3), None),
+        "varying lengths": (gn.Matern(1.5, 1), along_x(lambda x: isotropic(0.3 * np.exp(0.3 * x)), 3)),
+    }[name]
+    # So far from 0 that hardly a ray ends in a hit, and near enough for all of it to be drawn.
+    gp = gn.GaussianProcess(4.0, 1.0, kernel, anisotropy=anisotropy, bounds=((-1, -1, -1), (1, 1, 1)))
+    n = 20_000 if full_size else 2000
+    t = np.linspace(1.15, 2.8, 34) + 0.003 * np.arange(34)
+    step = 0.003
+    both = np.sort(np.concatenate([t, t + step, [4.0]]))
+    f = gn.line_values(gp, np.tile([-2.0, 0.1, 0.2], (n, 1)), np.tile([1.0, 0, 0], (n, 1)), both, sampler="dense", seed=seed)
+    f = f.reshape(n, -1)[:, :-1]
+    f = f[np.isfinite(f).all(axis=1)]
+    assert len(f) > 0.98 * n
+    points = np.column_stack([both[:-1] - 2, np.full(len(both) - 1, 0.1), np.full(len(both) - 1, 0.2)])
+    k = gp.covariance(points, points)
+    first, second = np.searchsorted(both, t), np.searchsorted(both, t + step)
+    variance = k[first, first] + k[second, second] - 2 * k[first, second]
+    ratio = ((f[:, second] - f[:, first]) ** 2 / variance).mean(axis=1)
+    check_z(ratio.mean(), 1, ratio.std() / np.sqrt(len(ratio)), name)

@@ -4,7 +4,7 @@ that ray ends, against explicit realisations that numpy draws, blends and traces
 import gpis_native as gn
 import numpy as np
 import pytest
-from csg_leaves import X, conditioned, draw, rays, sphere
+from csg_leaves import Leaf, X, conditioned, draw, rays
 from remembered import take
 from statistics_checks import check_proportion, check_same_distribution, check_z
 
@@ -15,8 +15,13 @@ STEP = X[1] - X[0]
 CENTERS, RADIUS = np.array([[1.5, 1.5, 0.0], [1.6, -1.5, 0.0]]), 1.5
 
 
+# Out of the way: the realisations have none, and second rays go where they like.
+BOUNDS = ((-9, -9, -9), (9, 9, 9))
+
+
 def balls(sigmas, lengths):
-    return [sphere(*c[:2], RADIUS, s, length) for c, s, length in zip(CENTERS, sigmas, lengths, strict=True)]
+    means = [gn.SphereField(c, RADIUS) for c in CENTERS]
+    return [Leaf(m, s, length, bounds=BOUNDS) for m, s, length in zip(means, sigmas, lengths, strict=True)]
 
 
 SCENES = {
@@ -44,7 +49,9 @@ def blended(f):
     """F and the weights of the two leaves."""
     apart = f[..., 0] - f[..., 1]
     share = np.clip(0.5 - apart / (2 * BLEND), 0, 1)
-    return np.minimum(f[..., 0], f[..., 1]) - np.maximum(BLEND - np.abs(apart), 0) ** 2 / (4 * BLEND), np.stack([share, 1 - share], -1)
+    return np.minimum(f[..., 0], f[..., 1]) - np.maximum(BLEND - np.abs(apart), 0) ** 2 / (4 * BLEND), np.stack(
+        [share, 1 - share], -1
+    )
 
 
 def crossing(f):
@@ -106,7 +113,9 @@ def explicit(scene, everything, n, rng):
         along = rise[r, i] + fraction * (rise[r, i + 1] - rise[r, i])
         slope.append(np.column_stack([along, across[0 if shared else k]]))
         gradient.append(unit(position - CENTERS[k]) + leaf.sigma * slope[k])
-    at_hit = [np.linalg.norm(position - c, axis=1) - RADIUS + leaf.sigma * v for c, leaf, v in zip(CENTERS, leaves, value, strict=True)]
+    at_hit = [
+        np.linalg.norm(position - c, axis=1) - RADIUS + leaf.sigma * v for c, leaf, v in zip(CENTERS, leaves, value, strict=True)
+    ]
     weights = blended(np.stack(at_hit, axis=-1))[1]
     normal = sum(weights[:, k, None] * gradient[k] for k in range(2))
     directions = cosine(normal, rng)
@@ -163,7 +172,6 @@ def test_light_after_one_bounce(scene, memory, n, seed):
     expected = 1 - share * np.isfinite(t).mean()
     forward = np.eye(4)
     forward[:3, :3] = np.array([[0, 0, -1], [0, 1, 0], [1, 0, 0]])  # looks along x
-    forward[:3, 3] = (-1, 0, 0)
     scene_description = {
         "version": 1,
         "settings": {"max_bounces": 0},
