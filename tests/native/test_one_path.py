@@ -15,7 +15,8 @@ X = np.array([1.0, 0, 0])
 RADIAL = ("squared exponential", "matern 3/2", "matern 5/2", "wong", "rational quadratic")
 # Bridges draw what they are asked for: behind a hit they no longer know at what its root was refined. The joint law of place and
 # slope there is that of the closed form: test_markov.py.
-BRIDGES = [(k, s) for k, s in SERVED if s == "markov" or (s == "dense" and k in ("matern 3/2", "matern 5/2", "wong"))]
+ROUGH = ("matern 3/2", "matern 5/2", "wong", "sum with a rough term", "sum of rough terms")
+BRIDGES = [(k, s) for k, s in SERVED if s == "markov" or (s == "dense" and k in ROUGH)]
 
 
 def along_x(n):
