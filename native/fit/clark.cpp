@@ -33,12 +33,19 @@ double distance(const Jet& a, const Jet& b, double covariance, double mean, doub
   const bool certain = !(a.sigma > 0 && b.sigma > 0);
   const double r = certain ? 0 : std::clamp(covariance / (a.sigma * b.sigma), -1.0, 1.0);
   double most = 0;
-  for (int i = -32; i <= 32; ++i) {
-    const double z = i / 8.0, x = mean + z * deviation;
-    const double h = std::clamp(standard(x, a), -40.0, 40.0),
-                 k = std::clamp(standard(x, b), -40.0, 40.0);
-    most = std::max(most, std::abs(bivariate_cdf(h, k, r) - normal_cdf(z)));
-  }
+  const auto look_over = [&](double middle, double width) {
+    for (int i = -32; i <= 32; ++i) {
+      const double x = middle + i / 8.0 * width;
+      const double h = std::clamp(standard(x, a), -40.0, 40.0),
+                   k = std::clamp(standard(x, b), -40.0, 40.0);
+      most = std::max(most, std::abs(bivariate_cdf(h, k, r) - normal_cdf((x - mean) / deviation)));
+    }
+  };
+  look_over(mean, deviation);
+  // An operand that is far more certain than the whole falls between those points.
+  for (const Jet* narrow : {&a, &b})
+    if (narrow->sigma > 0 && narrow->sigma < 0.5 * deviation)
+      look_over(narrow->mean, narrow->sigma);
   // A certain operand is an atom of the distribution: the distance just below and on it.
   for (const Jet* atom : {&a, &b})
     if (!(atom->sigma > 0)) {
