@@ -32,13 +32,21 @@ double distance(const Jet& a, const Jet& b, double covariance, double mean, doub
   if (!(deviation > 0)) return 0;
   const bool certain = !(a.sigma > 0 && b.sigma > 0);
   const double r = certain ? 0 : std::clamp(covariance / (a.sigma * b.sigma), -1.0, 1.0);
-  double most = 0;
+  double most = 0, where = mean;
+  const auto look_at = [&](double x) {
+    const double h = std::clamp(standard(x, a), -40.0, 40.0),
+                 k = std::clamp(standard(x, b), -40.0, 40.0);
+    const double here = std::abs(bivariate_cdf(h, k, r) - normal_cdf((x - mean) / deviation));
+    if (here > most) where = x;
+    most = std::max(most, here);
+  };
+  // Then closer and closer to where it is largest: operands that move together have a kink there.
   const auto look_over = [&](double middle, double width) {
-    for (int i = -32; i <= 32; ++i) {
-      const double x = middle + i / 8.0 * width;
-      const double h = std::clamp(standard(x, a), -40.0, 40.0),
-                   k = std::clamp(standard(x, b), -40.0, 40.0);
-      most = std::max(most, std::abs(bivariate_cdf(h, k, r) - normal_cdf((x - mean) / deviation)));
+    for (int i = -32; i <= 32; ++i) look_at(middle + i / 8.0 * width);
+    for (double step = width / 16; step > width / 200; step /= 2) {
+      const double x = where;
+      look_at(x - step);
+      look_at(x + step);
     }
   };
   look_over(mean, deviation);

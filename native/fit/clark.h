@@ -15,7 +15,7 @@ struct Greatest {
 // `covariance` of the two values. Exact; a second variable that is the first plus a constant, or
 // two certain ones, are no special case. `kolmogorov`, if `shape` is asked for: distance to the
 // normal distribution of the same mean and variance, over 65 points of it and of each operand that
-// is less than half as wide.
+// is less than half as wide, and some about the largest.
 Greatest greatest(const Jet& a, const Jet& b, double covariance, bool shape);
 
 // Standard normal distribution function and density.

@@ -151,8 +151,9 @@ def test_shape_of_the_distribution(blend, seed):
             a, b = (pairs.m[k][node] + pairs.s[k][node] * g[k] for k in range(2))
             f = np.sort(np.minimum(a, b) - (np.maximum(blend - np.abs(a - b), 0) ** 2 / (4 * blend) if blend else 0))
             y = (f - f.mean()) / f.std()
-            check_z(exact["skewness"][node], np.mean(y**3), 6 / np.sqrt(n))
-            check_z(sampled["skewness"][node], exact["skewness"][node], 6 / np.sqrt(20_000))
+            spread = max(6, np.std(y**3))  # where one operand wins seldom and by far, tails are long
+            check_z(exact["skewness"][node], np.mean(y**3), spread / np.sqrt(n))
+            check_z(sampled["skewness"][node], exact["skewness"][node], spread / np.sqrt(20_000))
             distance = np.max(np.abs(cdf(y[::100]) - np.arange(n)[::100] / n))
             assert abs(exact["kolmogorov"][node] - distance) < 0.01
             assert exact["kolmogorov"][node] - 0.03 < sampled["kolmogorov"][node] < exact["kolmogorov"][node] + 0.03
