@@ -47,34 +47,42 @@ py::array_t<Number> array_of(std::vector<T> values, const std::vector<py::ssize_
 }
 
 // What rows have seen of their realisations, memory `global`: seed (N,), and where they were moved
-// outside, point (N, 3), value (N,), NaN where they were not; of a tree for each of its leaves.
+// outside, point (N, 3), value (N,), NaN where they were not, by the first ray and by the last of
+// the others; of a tree for each of its leaves.
 std::vector<RealisationMemory> realisations_argument(const py::handle& argument, std::size_t n,
                                                      std::size_t leaves) {
   constexpr const char* sentence =
-      "start['realisation'] must be a dict of seed (N,), entry (N, 3) and shift (N,), as in the "
-      "state of earlier hits.";
+      "start['realisation'] must be a dict of seed (N,), entry (N, 3), shift (N,), moved (N, 3) "
+      "and "
+      "moved_shift (N,), as in the state of earlier hits.";
   if (!py::isinstance<py::dict>(argument)) throw std::invalid_argument(sentence);
   const auto dict = py::reinterpret_borrow<py::dict>(argument);
-  for (const char* key : {"seed", "entry", "shift"})
-    if (!dict.contains(key) || py::len(dict) != 3) throw std::invalid_argument(sentence);
+  for (const char* key : {"seed", "entry", "shift", "moved", "moved_shift"})
+    if (!dict.contains(key) || py::len(dict) != 5) throw std::invalid_argument(sentence);
   const auto seed =
       py::array_t<std::uint64_t, py::array::c_style | py::array::forcecast>::ensure(dict["seed"]);
-  const Array entry = Array::ensure(dict["entry"]), shift = Array::ensure(dict["shift"]);
   const auto count = static_cast<py::ssize_t>(n * leaves);
   const py::ssize_t rank = leaves > 1 ? 2 : 1;
-  if (!seed || !entry || !shift || seed.ndim() != rank || shift.ndim() != rank ||
-      entry.ndim() != rank + 1 || entry.shape(rank) != 3 || seed.size() != count ||
-      shift.size() != count || entry.size() != 3 * count) {
+  bool good = seed && seed.ndim() == rank && seed.size() == count;
+  std::vector<RealisationMemory> out(count);
+  const auto read = [&](const char* where, const char* by,
+                        RealisationCondition RealisationMemory::*to) {
+    const Array at = Array::ensure(dict[where]), shift = Array::ensure(dict[by]);
+    good = good && at && shift && shift.ndim() == rank && shift.size() == count &&
+           at.ndim() == rank + 1 && at.shape(rank) == 3 && at.size() == 3 * count;
+    for (py::ssize_t i = 0; good && i < count; ++i) {
+      const double* x = at.data() + 3 * i;
+      if (std::isfinite(shift.data()[i]))
+        out[i].*to = {true, {x[0], x[1], x[2]}, {shift.data()[i], {}}, -1, {}};
+    }
+  };
+  read("entry", "shift", &RealisationMemory::entry);
+  read("moved", "moved_shift", &RealisationMemory::moved);
+  if (!good) {
     PyErr_Clear();
     throw std::invalid_argument(sentence);
   }
-  std::vector<RealisationMemory> out(count);
-  for (py::ssize_t i = 0; i < count; ++i) {
-    out[i].seed = seed.data()[i];
-    const double* at = entry.data() + 3 * i;
-    if (std::isfinite(shift.data()[i]))
-      out[i].entry = {true, {at[0], at[1], at[2]}, {shift.data()[i], {}}, -1, {}};
-  }
+  for (py::ssize_t i = 0; i < count; ++i) out[i].seed = seed.data()[i];
   return out;
 }
 
@@ -83,17 +91,21 @@ py::dict realisations_dict(const std::vector<RealisationMemory>& realisations, p
   std::vector<py::ssize_t> shape{count / leaves};
   if (leaves > 1) shape.push_back(leaves);
   py::array_t<std::uint64_t> seed(shape);
-  Array shift(shape);
+  Array shift(shape), moved_shift(shape);
   shape.push_back(3);
-  Array entry(shape);
+  Array entry(shape), moved(shape);
+  const auto write = [](const RealisationCondition& c, double* at, double& by) {
+    by = c.active ? c.weight.value : kNan;
+    for (int k = 0; k < 3; ++k) at[k] = c.active ? c.at[k] : kNan;
+  };
   for (py::ssize_t i = 0; i < count; ++i) {
     const RealisationMemory& r = realisations[i];
     seed.mutable_data()[i] = r.seed;
-    shift.mutable_data()[i] = r.entry.active ? r.entry.weight.value : kNan;
-    for (int k = 0; k < 3; ++k)
-      entry.mutable_data()[3 * i + k] = r.entry.active ? r.entry.at[k] : kNan;
+    write(r.entry, entry.mutable_data() + 3 * i, shift.mutable_data()[i]);
+    write(r.moved, moved.mutable_data() + 3 * i, moved_shift.mutable_data()[i]);
   }
-  return py::dict("seed"_a = seed, "entry"_a = entry, "shift"_a = shift);
+  return py::dict("seed"_a = seed, "entry"_a = entry, "shift"_a = shift, "moved"_a = moved,
+                  "moved_shift"_a = moved_shift);
 }
 
 // What rows have kept of their last segments, memory `global-n`: the functionals value·g + slope·∇g

@@ -57,7 +57,8 @@ class SurfaceScatter {
     const std::optional<MaterialSample> s = material_.sample(wo_, at, tint_);
     if (!s) return std::nullopt;
     const Vec3 w = frame_.to_world(s->wi);
-    const bool through = s->wi.z < 0;
+    // Rounding may have turned a normal away from a grazing ray.
+    const bool through = !opaque_ && s->wi.z < 0;
     if (!bent_) return ScatterSample{w, s->weight, s->specular ? kInfinity : s->pdf, through};
     const Vec3 sent = transmitted(w) == through ? w : flipped(w);
     if (s->specular) return ScatterSample{sent, s->weight, kInfinity, through};

@@ -44,6 +44,8 @@ struct RealisationMemory {
   // The first ray of the path that met the process found itself inside: the realisation was moved
   // outside there (definitions B4).
   RealisationCondition entry;
+  // And the last later ray that did: for it and what follows, until the next one.
+  RealisationCondition moved;
 };
 
 }  // namespace gpis

@@ -77,8 +77,10 @@ void RealisationPath::draw(Rng& rng, Counters& counters) {
   drawn_ = true;
   realisation_->draw(kept_ ? kept_->seed : rng(), plan_->process->time);
   if (kept_) {
-    if (kept_->entry.active && kept_->entry.block < 0) kept_->entry.solve(plan_->posterior.get());
+    for (RealisationCondition* c : {&kept_->entry, &kept_->moved})
+      if (c->active && c->block < 0) c->solve(plan_->posterior.get());
     entry_ = kept_->entry;
+    own_ = kept_->moved;
   }
   realisation_->set_line(line_.origin, line_.direction);
   // The cubic is off by u²(h-u)² |g''''| / 24 <= (4/3)(B₁+B₂) (h/2)⁴ |g''''| / 24; 4.5 standard
@@ -120,7 +122,8 @@ double RealisationPath::start(const PathStart& known, Rng& rng, Counters& counte
     } else if (!kept_->entry.active) {
       kept_->entry = entry_ = condition(known);
     } else {
-      own_ = condition(known);
+      own_ = {};
+      kept_->moved = own_ = condition(known);
       ++counters.realisation_moved;
     }
     evaluate(anchor_, g, dg);

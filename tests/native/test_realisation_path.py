@@ -210,6 +210,25 @@ def test_global_furnace(material, seed):
     assert np.array_equal(results[0].passes["normal"], results[1].passes["normal"])
 
 
+@pytest.mark.parametrize("material", ["lambert", "mirror"])
+def test_global_enters_its_bounds_again(material, seed):
+    """A body that mostly is solid where its bounds end, above a floor: paths come back to it where their realisation is
+    inside, and it is moved out there. What such a ray hits, the next one leaves, in the same realisation: left in another one
+    paths stuck to the place until they were cut off (39 moves cost 4,400 vertices of 6,900). A path may end up in a pocket
+    without a way out, 1 of 20,000 did."""
+    gp = gn.GaussianProcess(-0.2, 0.1, gn.SquaredExponential(0.4), bounds=((-1,) * 3, (1,) * 3))
+    floor = {"vertices": [(-3, -3, -1.6), (3, -3, -1.6), (3, 3, -1.6), (-3, 3, -1.6)], "triangles": [(0, 1, 2), (0, 2, 3)]}
+    described = scene("global", material, world={"color": (1, 1, 1)}, settings={"max_bounces": 300}, meshes={"F": floor})
+    described["objects"][0]["process"] = gp
+    described["camera"]["fov_x"] = 1.2
+    described["materials"]["floor"] = {"type": "lambert", "color": (1, 1, 1)}
+    described["objects"].append({"name": "Floor", "type": "mesh", "mesh": "F", "materials": ["floor"]})
+    result = gn.render(gn.Scene(described), 8, 8, samples=64, seed=seed)
+    assert result.stats["realisation_moved"] > 20
+    assert result.stats["path_vertices"] < 4 * result.stats["camera_paths"]
+    assert np.sum(1 - result.passes["combined"][..., 0]) * 64 < 2
+
+
 def test_mirrors_know_their_gradient(seed):
     """Under global a mirror is a delta: no light is sampled from it, and it finds the same light by reflection."""
     white = {"world": BLACK, "lights": WHITE_SUNS}
