@@ -37,7 +37,7 @@ meshes: {name: dict}: vertices (N, 3); triangles (M, 3) integers; normals (N, 3)
     material_index (M,), places in the object's list of materials
 objects: a list of dicts: type "mesh" with mesh, its name | "gpis" with process, a GaussianProcess or a CSG tree, memory "renewal+" |
     "renewal" | "none" | "global-1" … "global-64" | "global", sampler "auto" | "convolution" | "markov" |
-    "spectral" | "nystrom" | "dense" | "realisation"; name; matrix (identity);
+    "spectral" | "nystrom" | "dense" | "realisation" | "first_passage"; name; matrix (identity);
     materials, names: for a gpis object one, or one for each operand of its tree
 
 Raises ValueError with the path of the value (objects[2].materials), what it holds and what it takes; FileNotFoundError where a

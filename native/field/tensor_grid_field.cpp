@@ -36,6 +36,16 @@ TensorGridField::TensorGridField(Bricks bricks, const Affine& index_to_object,
   find_kinks();
 }
 
+std::optional<SymMat3> TensorGridField::constant() const {
+  SymMat3 a;
+  for (int e = 0; e < 6; ++e) {
+    const Range entry = bricks_[e]->range();
+    if (entry.min != entry.max) return std::nullopt;
+    a[e] = entry.min;
+  }
+  return a;
+}
+
 SymMat3 TensorGridField::node(const Index3& at) const {
   const Index3& n = bricks_[0]->nodes();
   Index3 cell;

@@ -25,6 +25,7 @@ class TensorGridField final : public TensorField {
   TensorSlope along(const Vec3& o, const Vec3& d, double t, double side) const override;
   Range eigenvalues() const override { return eigenvalues_; }
   Range eigenvalues(const Box3& box) const override;
+  std::optional<SymMat3> constant() const override;
   double kinks(const Vec3& o, const Vec3& d, double t_begin, double t_end) const override;
 
  private:

@@ -21,6 +21,10 @@ class TransformedTensorField final : public TensorField {
   }
   Range eigenvalues() const override { return stretched(field_->eigenvalues()); }
   Range eigenvalues(const Box3& box) const override;
+  std::optional<SymMat3> constant() const override {
+    const std::optional<SymMat3> a = field_->constant();
+    return a ? std::optional(congruence(linear_, *a)) : std::nullopt;
+  }
   // J becomes M J Mᵀ as A does: A⁻¹J keeps its eigenvalues.
   double kinks(const Vec3& o, const Vec3& d, double t_begin, double t_end) const override {
     return field_->kinks(inverse_.point(o), inverse_.vector(d), t_begin, t_end);

@@ -52,6 +52,7 @@ RTCRay to_embree(const Ray& ray, double t_max) {
 
 struct TriangleScene::Impl {
   Device device{embree().rtcNewDevice(nullptr)};
+  Box3 reach;  // of all triangles, and a little more: Embree's own test is in single precision
   EmbreeScene top;
   std::vector<EmbreeScene> shared;  // of meshes that have several instances
   std::vector<TriangleMesh> meshes;
@@ -151,6 +152,9 @@ void TriangleScene::commit() {
   }
   embree().rtcCommitScene(impl.top.get());
   impl.check("build the hierarchy of the meshes");
+  const Box3 box = bounds();
+  const double more = 1e-5 * std::max(largest(box.min), largest(box.max));
+  impl.reach = {box.min - Vec3{more, more, more}, box.max + Vec3{more, more, more}};
 }
 
 Box3 TriangleScene::bounds() const {
@@ -159,8 +163,14 @@ Box3 TriangleScene::bounds() const {
   return {{b.lower_x, b.lower_y, b.lower_z}, {b.upper_x, b.upper_y, b.upper_z}};
 }
 
+bool TriangleScene::reached(const Ray& ray, double t_max) const {
+  const auto [begin, end] = clip(impl_->reach, ray.origin, ray.direction, 0, t_max);
+  return begin <= end;
+}
+
 bool TriangleScene::intersect(const Ray& ray, double t_max, MeshHit& hit,
                               Counters& counters) const {
+  if (!reached(ray, t_max)) return false;
   ++counters.mesh_rays;
   RTCRayHit r{};
   r.ray = to_embree(ray, t_max);
@@ -212,6 +222,7 @@ bool TriangleScene::intersect(const Ray& ray, double t_max, MeshHit& hit,
 }
 
 bool TriangleScene::occluded(const Ray& ray, double t_max, Counters& counters) const {
+  if (!reached(ray, t_max)) return false;
   ++counters.mesh_rays;
   RTCRay r = to_embree(ray, t_max);
   embree().occluded1(impl_->top.get(), &r);

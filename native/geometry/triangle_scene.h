@@ -47,6 +47,9 @@ class TriangleScene {
   bool occluded(const Ray& ray, double t_max, Counters& counters) const;
 
  private:
+  // Whether the ray comes near any triangle: others are not handed to Embree.
+  bool reached(const Ray& ray, double t_max) const;
+
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

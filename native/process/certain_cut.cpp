@@ -80,13 +80,14 @@ std::string CertainCut::describe() const {
   std::string list;
   for (const Certain& c : certain_) list += (list.empty() ? "" : ", ") + std::to_string(c.leaf);
   return "cut by certain operands (" + list + "), operand " + std::to_string(random_) +
-         " marched alone; together on rays that see it twice";
+         (alone_ ? " by a table (cut)" : " marched alone") + "; together on rays that see it twice";
 }
 
 std::vector<std::pair<std::string, std::string>> CertainCut::plan() const {
   if (!alone_) return {};
-  return {
-      {"cut", "operand " + std::to_string(random_) + " by " + alone_->planned().sampler_reason}};
+  const std::string operand = "operand " + std::to_string(random_);
+  return {{"cut", operand + " by " + alone_->planned().sampler_reason + "; leaf[" +
+                      std::to_string(random_) + "].sampler serves all other rays"}};
 }
 
 std::optional<CertainCut::Stretch> CertainCut::seen(const std::vector<ProcessSurface>& leaves,

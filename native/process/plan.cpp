@@ -3,8 +3,10 @@
 #include <algorithm>
 
 #include "field/check.h"
+#include "field/constant_field.h"
 #include "field/scaled_field.h"
 #include "kernel/scaled_kernel.h"
+#include "kernel/transformed_kernel.h"
 #include "process/conditioned_sampler.h"
 #include "process/conditions.h"
 #include "process/covariance.h"
@@ -21,13 +23,54 @@ namespace {
 constexpr double kMostSteps = 1 << 20;
 constexpr double kTooManySteps = 1e6;
 
-// The same f with a kernel of unit variance: the weight of a kernel multiplies σ² (definitions E9).
-std::shared_ptr<const GaussianProcess> normalised(std::shared_ptr<const GaussianProcess> process) {
-  const double variance = process->kernel->variance();
-  if (variance == 1) return process;
-  auto out = std::make_shared<GaussianProcess>(*process);
-  out->sigma = scaled(process->sigma, std::sqrt(variance));
-  out->kernel = std::make_shared<ScaledKernel>(1 / variance, process->kernel);
+Box3 everywhere() {
+  return {{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
+}
+
+Box3 intersection(const Box3& a, const Box3& b) {
+  Box3 r;
+  for (int i = 0; i < 3; ++i) {
+    r.min[i] = std::max(a.min[i], b.min[i]);
+    r.max[i] = std::min(a.max[i], b.max[i]);
+  }
+  return r;
+}
+
+// A field that is the same everywhere is a constant, however it is held.
+FieldPtr constant_if_it_is(const FieldPtr& field) {
+  const Range range = field->range();
+  const bool known = dynamic_cast<const ConstantField*>(field.get());
+  if (known || range.min != range.max || !std::isfinite(range.min)) return field;
+  return std::make_shared<ConstantField>(range.min);
+}
+
+// L⁻¹ of A = L Lᵀ: what makes length scales √A those of a kernel without any.
+Mat3 whitening(const SymMat3& a) {
+  const Cholesky3 c(a);
+  const double x = 1 / std::sqrt(c.d0), y = 1 / std::sqrt(c.d1), z = 1 / std::sqrt(c.d2);
+  return {
+      {Vec3{x, 0, 0}, Vec3{-c.l10 * y, y, 0}, Vec3{(c.l10 * c.l21 - c.l20) * z, -c.l21 * z, z}}};
+}
+
+// The same f by the least that it takes: a kernel of unit variance (the weight of a kernel
+// multiplies σ², definitions E9), and no grid where a constant does.
+std::shared_ptr<const GaussianProcess> normalised(const GaussianProcess& process) {
+  auto out = std::make_shared<GaussianProcess>(process);
+  out->sigma = constant_if_it_is(process.sigma);
+  out->mean = constant_if_it_is(process.mean);
+  if (const auto support = process.mean->support(); support && out->mean != process.mean)
+    out->bounds = intersection(process.bounds.value_or(everywhere()), *support);
+  if (const auto a = process.anisotropy ? process.anisotropy->constant() : std::nullopt) {
+    const Covariance refuses_what_takes_no_lengths(process);
+    out->kernel = std::make_shared<TransformedKernel>(
+        process.kernel, whitening(*a), std::sqrt(process.anisotropy->eigenvalues().min));
+    out->anisotropy = nullptr;
+  }
+  const double variance = process.kernel->variance();
+  if (variance != 1) {
+    out->sigma = scaled(out->sigma, std::sqrt(variance));
+    out->kernel = std::make_shared<ScaledKernel>(1 / variance, out->kernel);
+  }
   return out;
 }
 
@@ -109,38 +152,37 @@ double steepest(const Kernel& kernel) {
   return std::sqrt(most);
 }
 
-Box3 everywhere() {
-  return {{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
-}
-
-Box3 intersection(const Box3& a, const Box3& b) {
-  Box3 r;
-  for (int i = 0; i < 3; ++i) {
-    r.min[i] = std::max(a.min[i], b.min[i]);
-    r.max[i] = std::min(a.max[i], b.max[i]);
-  }
-  return r;
-}
-
-// Where mean and deviation are constant, Rice's rate (oracle 2) says how many rays get as far as
-// the march does, and how many of these would have met the surface behind: more of them than roots
-// may be missed would end in the middle of the process without a word.
-void check_steps(const PlannedLine& plan, const Range& mean, const Range& sigma,
-                 double missed_root) {
-  if (!(plan.steps > kMostSteps) || mean.min != mean.max || sigma.min != sigma.max ||
-      sigma.min == 0 || mean.min > plan.skip_threshold)
-    return;
-  const double level = mean.min / sigma.min;
+// Of a constant mean and deviation: the probability that a ray meets the surface first behind so
+// many of the length scales that its bounds are across (Rice's rate, math.md §4).
+double missed_behind(double marched, double lengths, double level) {
   const double rate = std::exp(-0.5 * level * std::max(level, 0.0)) / (2 * kPi);  // a length scale
-  const double marched = kMostSteps / 4, behind = plan.steps / 4 - marched;
-  const double missed = std::exp(-rate * marched) * -std::expm1(-rate * behind);
-  if (missed <= missed_root) return;
-  refuse(
-      "The mean of ", level,
-      " standard deviations is rarely met and nowhere certain, and the bounds are ",
-      static_cast<long>(plan.steps / 4), " length scales across: a ray may take more than the ",
-      static_cast<long>(kMostSteps),
-      " steps that are the most. Take a longer length_scale, smaller bounds, or a smaller mean.");
+  return lengths > marched ? std::exp(-rate * marched) * -std::expm1(-rate * (lengths - marched))
+                           : 0;
+}
+
+// Refuses lines that go on for longer than is marched or known, where that can be told.
+void check_length(const PlannedLine& plan, const Range& mean, const Range& sigma,
+                  double missed_root) {
+  if (mean.min != mean.max || sigma.min != sigma.max || sigma.min == 0 ||
+      mean.min > plan.skip_threshold)
+    return;
+  const double level = mean.min / sigma.min, lengths = plan.steps / 4;
+  if (plan.steps > kMostSteps && missed_behind(kMostSteps / 4, lengths, level) > missed_root)
+    refuse(
+        "The mean of ", level,
+        " standard deviations is rarely met and nowhere certain, and the bounds are ",
+        static_cast<long>(lengths), " length scales across: a ray may take more than the ",
+        static_cast<long>(kMostSteps),
+        " steps that are the most. Take a longer length_scale, smaller bounds, or a smaller mean.");
+  const double reach = plan.line_sampler ? plan.line_sampler->reach() : kInfinity;
+  if (missed_behind(reach, lengths, level) > missed_root)
+    refuse(
+        "The mean of ", level,
+        " standard deviations is rarely met and nowhere certain, and the bounds are ",
+        static_cast<long>(lengths),
+        " length scales across: spectral lines of this kernel repeat themselves after ", reach,
+        ". Take a longer length_scale, smaller bounds, a smaller mean, or a squared exponential or "
+        "Matern kernel (sampler 'auto').");
 }
 
 // Puts a table in the place of the march that draws it, where it serves the process.
@@ -178,7 +220,7 @@ std::shared_ptr<const GaussianProcess> inside_out(const GaussianProcess& process
 PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Memory memory,
                       Sampler sampler, double missed_root, bool alone) {
   PlannedLine plan;
-  process = normalised(std::move(process));
+  process = normalised(*process);
   const Range sigma = process->sigma->range();
   if (sigma.min < 0)
     refuse(
@@ -220,7 +262,7 @@ PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Memory mem
   // A certain surface (σ = 0) still needs a last step across it: stop a little before the root.
   const double scale = std::min(shortest, std::isfinite(diagonal) ? diagonal : 1.0);
   plan.skip_threshold = std::max(plan.skip_deviations * sigma.max, 1e-4 * scale);
-  check_steps(plan, mean, sigma, missed_root);
+  check_length(plan, mean, sigma, missed_root);
   // A ray meets the surface about a deviation behind the place where it may first be, unless it
   // starts behind that.
   const double slope = process->mean->lipschitz();
@@ -263,6 +305,7 @@ PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Memory mem
         plan_first_passage(plan, *process, missed_root, asked);
     }
     plan.condition_pull = plan.line_sampler->condition_pull();
+    check_length(plan, mean, sigma, missed_root);
   }
   plan.process = std::move(process);
   return plan;

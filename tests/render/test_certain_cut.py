@@ -226,7 +226,7 @@ def test_the_plan_says_what_is_cut():
     """And the counters agree: of what is cut alone nothing certain is looked up, what a table serves is not marched."""
     wedge, together = pair("wedge")
     row, table, stats = facts(wedge)
-    assert "cut by certain operands (1), operand 0 marched alone" in row
+    assert "cut by certain operands (1), operand 0 by a table (cut); together on rays" in row
     assert table.startswith("operand 0 by first_passage: ")
     assert stats["line_tabulated"] > 0 == stats["line_evaluations"] == stats["mean_lookups"]
     row, table, stats = facts(gn.intersection(BALL, certain(PLANE)))

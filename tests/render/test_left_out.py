@@ -7,6 +7,7 @@ import gpis_native as gn
 import numpy as np
 import pytest
 from scene_parts import CONDITIONS, LAMP, TRIANGLE, ball, combed, counted, painted, scene, varying
+from statistics_checks import check_same_distribution
 
 ROWS = {
     "mesh_rays": lambda: scene(mesh=True),
@@ -117,18 +118,44 @@ def unused(folder):
     ]
     dark = plain | {"lights": [LAMP, LAMP | {"name": "Off", "power": 0.0}]}
     mesh = plain | {"meshes": {"Unused": TRIANGLE}}
+    behind = np.eye(4)
+    behind[2, 3] = 3000
+    sheet = {"name": "Sheet", "type": "mesh", "mesh": "Sheet", "materials": ["Body"], "matrix": behind}
+    apart_mesh = plain | {"meshes": {"Sheet": TRIANGLE}, "objects": [*plain["objects"], sheet]}
     material = plain | {"materials": plain["materials"] | {"Unused": {"type": "mirror", "color": (1, 1, 1)}}}
     return {
         "light": (plain, dark),
         "mesh": (plain, mesh),
         "material": (plain, material),
         "object": (plain, apart),
+        "mesh object": (plain, apart_mesh),
+        "grid of one sigma": (scene(ball(0.0625)), scene(ball(gn.GridField(np.full((2, 2, 2), 0.0625), 3.0, (-1.5,) * 3)))),
         "grid": of_grid,
     }
 
 
-@pytest.mark.parametrize("kind", ["light", "mesh", "material", "object", "grid"])
+@pytest.mark.parametrize("kind", ["light", "mesh", "material", "object", "mesh object", "grid", "grid of one sigma"])
 def test_what_is_not_used_changes_no_counter(kind, seed, tmp_path):
     plain, more = unused(tmp_path)[kind]
     assert counted(plain, seed)["line_evaluations"] > 0
     assert counted(plain, seed) == counted(more, seed)
+
+
+def test_grids_that_are_the_same_everywhere_are_constants(seed):
+    """Length scales .5, 1 and .25 along turned axes, on a grid and in the kernel: one law, and no tensor is looked up."""
+    turn = np.array([[0.6, -0.8, 0], [0.8, 0.6, 0], [0, 0, 1]])
+    a = turn @ np.diag([0.25, 1, 0.0625]) @ turn.T
+    entries = np.array([a[0, 0], a[1, 1], a[2, 2], a[0, 1], a[0, 2], a[1, 2]])
+    grid = gn.TensorGridField(np.broadcast_to(entries, (3, 3, 3, 6)), 1.5, (-1.5,) * 3)
+    half = np.arctan2(0.8, 0.6) / 2
+    kernel = gn.SquaredExponential((0.5, 1, 0.25), rotation=(np.cos(half), 0, 0, np.sin(half)))
+    origins, directions = np.tile([0.3, -0.2, 3.0], (20_000, 1)), np.tile([0, 0.28, -0.96], (20_000, 1))
+    hits = []
+    for more in ({"kernel": gn.SquaredExponential(1.0), "anisotropy": grid}, {"kernel": kernel}):
+        gp = gn.GaussianProcess(gn.SphereField((0, 0, 0), 1), 0.3, bounds=((-2.5,) * 3, (2.5,) * 3), **more)
+        assert gp.plan()["sampler"].startswith("convolution")
+        hits.append(gn.first_hits(gp, origins, directions, 10, seed=seed + len(hits)))
+        for name in ("tensor_lookups", "factorisations"):
+            assert hits[-1]["counters"][name] == 0, name
+    for what in (lambda h: h["t"], lambda h: h["gradient"][:, 0], lambda h: h["gradient"][:, 1]):
+        check_same_distribution(*(what(h)[np.isfinite(h["t"])] for h in hits))
