@@ -27,10 +27,12 @@ void add_samples(Film& film, int x, int y, const py::object& radiance, int first
   if (!values || values.ndim() != 2 || values.shape(1) != 3)
     refuse("radiance", "takes numbers of shape (N, 3)");
   Counters counters;
-  for (py::ssize_t first = 0; first < values.shape(0); first += kBlockSamples) {
+  for (py::ssize_t i = 0; i < values.shape(0);) {
+    const SampleBlock place = block_of(first_sample + static_cast<int>(i));
+    const py::ssize_t end =
+        std::min<py::ssize_t>(place.first + place.size - first_sample, values.shape(0));
     PixelBlock block;
-    for (py::ssize_t i = first; i < std::min<py::ssize_t>(first + kBlockSamples, values.shape(0));
-         ++i)
+    for (; i < end; ++i)
       block.add({{values.at(i, 0), values.at(i, 1), values.at(i, 2)}, 1, kInfinity, {}, {}},
                 counters);
     film.add(static_cast<std::size_t>(y) * film.width() + x, block);
@@ -50,11 +52,12 @@ py::dict film_passes(const Film& film) {
   return passes;
 }
 
-// Saved as: wide (H, W, 8, 2) the 128-bit sums, low word first; narrow (H, W, 7); counts (H, W, 3).
+// Saved as: wide (H, W, 11, 2) the 128-bit sums, low word first; narrow (H, W, 8); counts (H, W,
+// 3).
 py::dict film_arrays(const Film& film) {
   const py::ssize_t h = film.height(), w = film.width();
-  py::array_t<std::uint64_t> wide({h, w, py::ssize_t{8}, py::ssize_t{2}});
-  py::array_t<std::int64_t> narrow({h, w, py::ssize_t{7}});
+  py::array_t<std::uint64_t> wide({h, w, py::ssize_t{11}, py::ssize_t{2}});
+  py::array_t<std::int64_t> narrow({h, w, py::ssize_t{8}});
   py::array_t<std::uint32_t> counts({h, w, py::ssize_t{3}});
   std::uint64_t* to_wide = wide.mutable_data();
   std::int64_t* to_narrow = narrow.mutable_data();
@@ -66,10 +69,12 @@ py::dict film_arrays(const Film& film) {
   for (const PixelSums& p : film.pixels()) {
     for (const Fixed v : p.radiance) put(v);
     for (const Fixed v : p.squares) put(v);
+    for (const Fixed v : p.weighted) put(v);
     put(p.depth);
     *to_narrow++ = p.alpha;
     for (const std::int64_t v : p.normal) *to_narrow++ = v;
     for (const std::int64_t v : p.albedo) *to_narrow++ = v;
+    *to_narrow++ = p.sizes;
     for (const std::uint32_t v : {p.count, p.hits, p.blocks}) *to_counts++ = v;
   }
   py::dict arrays;
@@ -83,8 +88,8 @@ Film film_from_arrays(const py::handle& arrays) {
   const auto wide = py::cast<py::array_t<std::uint64_t, py::array::c_style>>(arrays["wide"]);
   const auto narrow = py::cast<py::array_t<std::int64_t, py::array::c_style>>(arrays["narrow"]);
   const auto counts = py::cast<py::array_t<std::uint32_t, py::array::c_style>>(arrays["counts"]);
-  if (wide.ndim() != 4 || wide.shape(2) != 8 || wide.shape(3) != 2 || narrow.ndim() != 3 ||
-      narrow.shape(2) != 7 || counts.ndim() != 3 || counts.shape(2) != 3 ||
+  if (wide.ndim() != 4 || wide.shape(2) != 11 || wide.shape(3) != 2 || narrow.ndim() != 3 ||
+      narrow.shape(2) != 8 || counts.ndim() != 3 || counts.shape(2) != 3 ||
       narrow.shape(0) != wide.shape(0) || counts.shape(0) != wide.shape(0) ||
       narrow.shape(1) != wide.shape(1) || counts.shape(1) != wide.shape(1) || wide.size() == 0)
     throw std::invalid_argument("the arrays of its film do not fit together");
@@ -99,10 +104,12 @@ Film film_from_arrays(const py::handle& arrays) {
   for (PixelSums& p : film.pixels()) {
     for (Fixed& v : p.radiance) v = take();
     for (Fixed& v : p.squares) v = take();
+    for (Fixed& v : p.weighted) v = take();
     p.depth = take();
     p.alpha = *from_narrow++;
     for (std::int64_t& v : p.normal) v = *from_narrow++;
     for (std::int64_t& v : p.albedo) v = *from_narrow++;
+    p.sizes = *from_narrow++;
     p.count = *from_counts++;
     p.hits = *from_counts++;
     p.blocks = *from_counts++;
@@ -113,7 +120,7 @@ Film film_from_arrays(const py::handle& arrays) {
 void bind_film(py::module_& m) {
   py::class_<Film>(m, "Film",
                    "The film alone, for samples made elsewhere: exact sums over blocks of 16 "
-                   "samples per pixel.\n"
+                   "samples per pixel, of 8 in the first two.\n"
                    "Film(width, height); row 0 is at the bottom.")
       .def(py::init([](int width, int height) {
              if (width < 1 || height < 1) refuse("Film", "takes a positive width and height");

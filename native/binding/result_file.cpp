@@ -9,7 +9,7 @@ namespace gpis {
 
 namespace {
 
-const char* const kFormat = "gpis result 1";
+const char* const kFormat = "gpis result 2";
 
 py::list ranges_list(const RenderResult& result) {
   py::list ranges;

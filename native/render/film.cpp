@@ -44,17 +44,23 @@ double narrow(std::int64_t v) {
   return static_cast<double>(v) * kNarrowStep;
 }
 
-// S² / n of a sum of n samples: the block's term of Q.
-std::array<Fixed, 4> block_squares(const std::array<Fixed, 3>& radiance, std::uint32_t n) {
-  const Color s{wide(radiance[0]), wide(radiance[1]), wide(radiance[2])};
-  const double y = luminance(s);
-  return {to_square(s.x * s.x / n), to_square(s.y * s.y / n), to_square(s.z * s.z / n),
-          to_square(y * y / n)};
+// Of what is not negative, so that the order of addition makes no difference here either.
+constexpr Fixed kLargest = static_cast<Fixed>(~static_cast<unsigned __int128>(0) >> 1);
+void add_square(Fixed& to, Fixed square) {
+  if (__builtin_add_overflow(to, square, &to)) to = kLargest;
 }
 
-// Q of a pixel as a sum over blocks, whatever form it is kept in.
-std::array<Fixed, 4> squares_by_blocks(const PixelSums& p) {
-  return p.blocks == 1 ? block_squares(p.radiance, p.count) : p.squares;
+// The sums over blocks of a pixel that has one: its block's terms.
+PixelSums by_blocks(const PixelSums& p) {
+  if (p.blocks != 1) return p;
+  PixelSums out = p;
+  const Color s{wide(p.radiance[0]), wide(p.radiance[1]), wide(p.radiance[2])};
+  const double y = luminance(s);
+  out.squares = {to_square(s.x * s.x / 16), to_square(s.y * s.y / 16), to_square(s.z * s.z / 16),
+                 to_square(y * y / 16)};
+  for (int c = 0; c < 3; ++c) out.weighted[c] = p.radiance[c] / 16 * p.count;
+  out.sizes = static_cast<std::int64_t>(p.count) * p.count;
+  return out;
 }
 
 void add_all_but_squares(PixelSums& to, const PixelSums& from) {
@@ -75,22 +81,29 @@ void add_other_blocks(PixelSums& to, const PixelSums& from) {
     to = from;
     return;
   }
-  const auto a = squares_by_blocks(to), b = squares_by_blocks(from);
-  for (int c = 0; c < 4; ++c) to.squares[c] = a[c] + b[c];
-  add_all_but_squares(to, from);
-  to.blocks += from.blocks;
+  to = by_blocks(to);
+  const PixelSums more = by_blocks(from);
+  for (int c = 0; c < 4; ++c) add_square(to.squares[c], more.squares[c]);
+  for (int c = 0; c < 3; ++c) to.weighted[c] += more.weighted[c];
+  to.sizes += more.sizes;
+  add_all_but_squares(to, more);
+  to.blocks += more.blocks;
 }
 
-// Variance of the mean of channel c (3: luminance).
+// A channel of a sum, c = 3: luminance.
+double channel(const std::array<Fixed, 3>& sums, int c) {
+  return c < 3 ? wide(sums[c]) : luminance({wide(sums[0]), wide(sums[1]), wide(sums[2])});
+}
+
+// Variance of the mean of channel c. Rounding may leave less than nothing.
 double variance_of_mean(const PixelSums& p, int c) {
-  const double n = p.count, parts = p.blocks == 1 ? n : p.blocks;
-  if (!(parts >= 2)) return kInfinity;
-  const double s = c < 3
-                       ? wide(p.radiance[c])
-                       : luminance({wide(p.radiance[0]), wide(p.radiance[1]), wide(p.radiance[2])});
-  const double q = static_cast<double>(p.squares[c]) * kSquareStep;
-  return std::max(0.0,
-                  (q - s * s / n) / ((parts - 1) * n));  // rounding may leave less than nothing
+  if (p.count < 2 || p.squares[c] == kLargest) return kInfinity;
+  const double n = p.count, mean = channel(p.radiance, c) / n;
+  const double squares = static_cast<double>(p.squares[c]) * kSquareStep;
+  if (p.blocks == 1) return std::max(0.0, (squares / n - mean * mean) / (n - 1));
+  const double sizes = static_cast<double>(p.sizes);
+  const double spread = 16 * squares - mean * (32 * channel(p.weighted, c) - mean * sizes);
+  return std::max(0.0, spread / (n * n - sizes));
 }
 
 }  // namespace
@@ -108,9 +121,9 @@ bool PixelBlock::add(const FilmSample& sample, Counters& counters) {
   if (length(radiance - sample.radiance) > 0) ++counters.clamped_samples;
   std::array<Fixed, 3> x;
   for (int c = 0; c < 3; ++c) x[c] = to_wide(radiance[c]);
-  for (int c = 0; c < 3; ++c) sums_.squares[c] += to_square(radiance[c] * radiance[c]);
+  for (int c = 0; c < 3; ++c) add_square(sums_.squares[c], to_square(radiance[c] * radiance[c]));
   const double y = luminance(radiance);
-  sums_.squares[3] += to_square(y * y);
+  add_square(sums_.squares[3], to_square(y * y));
   for (int c = 0; c < 3; ++c) {
     sums_.radiance[c] += x[c];
     sums_.normal[c] += to_narrow(sample.normal[c]);
@@ -133,7 +146,7 @@ void Film::add(std::size_t index, const PixelBlock& block, bool continues) {
   PixelSums& to = pixels_[index];
   if (!continues || to.blocks == 0) return add_other_blocks(to, block.sums_);
   if (to.blocks != 1) throw std::logic_error("only a pixel's first block can be continued");
-  for (int c = 0; c < 4; ++c) to.squares[c] += block.sums_.squares[c];
+  for (int c = 0; c < 4; ++c) add_square(to.squares[c], block.sums_.squares[c]);
   add_all_but_squares(to, block.sums_);
 }
 

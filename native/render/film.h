@@ -4,10 +4,11 @@
 // Sums are integers (fixed point), so they do not depend on the order of addition: an image is the
 // same bit by bit whatever the threads, and merged slices equal the whole. The variance of a
 // pixel's mean comes from the spread of its block sums (a block's samples may depend on each other,
-// blocks do not): with sums S_b of n_b samples, S = Σ S_b, n = Σ n_b, Q = Σ S_b² / n_b, B blocks,
-//   Var(S/n) = (Q - S²/n) / ((B - 1) n).
-// A pixel with one block only is treated as if each of its samples were a block: Q = Σ x². The
-// second block turns Q over.
+// blocks do not): with sums S_b of n_b samples, S = Σ S_b, n = Σ n_b, m = S / n,
+//   Var(m) = Σ (S_b - n_b m)² / (n² - Σ n_b²),
+// which is unbiased where Var(S_b) goes as n_b, and close where a part of a block has a larger
+// share of it than a whole one (its samples depend on each other less).
+// A pixel with one block only is treated as if each of its samples were a block.
 #pragma once
 
 #include <array>
@@ -21,19 +22,22 @@
 namespace gpis {
 
 // Fixed point, 128 bits. Radiance and depth: steps of 2^-64, up to 9e18; squares: steps of 2^-56,
-// up to 2e21.
+// up to 2e21, where they stay: the variance is then infinite.
 using Fixed = __int128;
-// Samples are limited to this radiance so that sums cannot overflow before 2^33 of them (counted as
-// clamped).
+// Samples are limited to this radiance so that sums of radiance cannot overflow before 2^33 of them
+// (counted as clamped).
 inline constexpr double kRadianceLimit = 0x1p30;
 
 // The sums of one pixel over the samples it holds.
 struct PixelSums {
   std::array<Fixed, 3> radiance{};
-  std::array<Fixed, 4> squares{};  // Q of red, green, blue and luminance
-  Fixed depth = 0;                 // over the samples that hit something
-  std::int64_t alpha = 0;          // this and the following in steps of 2^-32
+  // Of red, green, blue and luminance: Σ x² over samples where there is one block, Σ S_b² / 16.
+  std::array<Fixed, 4> squares{};
+  std::array<Fixed, 3> weighted{};  // Σ n_b S_b / 16, 0 where there is one block
+  Fixed depth = 0;                  // over the samples that hit something
+  std::int64_t alpha = 0;           // this and the following in steps of 2^-32
   std::array<std::int64_t, 3> normal{}, albedo{};
+  std::int64_t sizes = 0;    // Σ n_b², 0 where there is one block
   std::uint32_t count = 0;   // finite samples
   std::uint32_t hits = 0;    // those with a finite depth
   std::uint32_t blocks = 0;  // blocks with at least one finite sample

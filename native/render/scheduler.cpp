@@ -15,7 +15,8 @@ constexpr int kMinimumForNoise = 4 * kBlockSamples;
 
 // The number of samples at which the error should fall to the threshold: it goes as 1 / samples.
 double samples_for_noise(double threshold, const RenderState& state) {
-  return state.samples * state.estimated_error / (threshold * threshold);
+  if (state.estimated_error == 0) return 0;
+  return state.samples * (state.estimated_error / threshold / threshold);
 }
 
 }  // namespace

@@ -106,10 +106,16 @@ void check_camera(const CameraDescription& c) {
          "); the near distance must be less than the far one.");
 }
 
+// Finite numbers whose product is not.
+void check_light_sent(const Color& color, double by, const std::string& what) {
+  if (!std::isfinite(3 * max_component(color) * by))
+    fail(what, " make more light than a number holds (", max_component(color), " times ", by, ").");
+}
+
 void check_world(const WorldDescription& w) {
   check_color(w.color, kInfinity, "world.color");
   check_at_least(w.strength, 0, "world.strength");
-  if (w.image.empty()) return;
+  if (w.image.empty()) return check_light_sent(w.color, w.strength, "world.color and strength");
   if (w.image_width < 1 || w.image_height < 1 ||
       w.image.size() != 3ull * w.image_width * w.image_height)
     fail("world.image holds ", w.image.size(), " numbers, but its size is ", w.image_width, " x ",
@@ -118,6 +124,9 @@ void check_world(const WorldDescription& w) {
     if (!std::isfinite(w.image[i]))
       fail("world.image holds ", w.image[i], " at row ", i / 3 / w.image_width, ", column ",
            i / 3 % w.image_width, "; all its numbers must be finite.");
+  const auto [least, most] = std::minmax_element(w.image.begin(), w.image.end());
+  const double largest = std::max(-*least, *most);
+  check_light_sent({largest, largest, largest}, w.strength, "world.image and strength");
   const Mat3 square = w.matrix * transpose(w.matrix);
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
@@ -132,6 +141,7 @@ void check_light(const LightDescription& l, const EntryPath& path) {
   check_color(l.color, kInfinity, path + ".color");
   check_at_least(l.power, 0, path + ".power");
   if (l.radiance) check_color(*l.radiance, kInfinity, path + ".radiance");
+  check_light_sent(l.color, l.power, path + ": color and power");
   check_size(l.radius, path + ".radius");
   check_between(l.blend, 0, 1, path + ".blend");
   if (l.type == LightDescription::Type::area) {

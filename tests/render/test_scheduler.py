@@ -64,3 +64,10 @@ def test_fraction_follows_the_nearest_rule():
     assert gn._next_round(25, 1.0, np.inf, samples=100, time_limit=2.0)[2] == pytest.approx(0.5)
     # 100 samples have error .04, the threshold .1 needs 400.
     assert gn._next_round(100, 1.0, 0.04, noise_threshold=0.1)[2] == pytest.approx(0.25)
+
+
+def test_a_threshold_whose_square_is_nothing_ends():
+    """Of a picture without noise; 0 / 0 samples were none that could be counted."""
+    assert gn._next_round(16, 1, 0.0, noise_threshold=1e-200)[0] > 0
+    assert gn._next_round(64, 1, 0.0, noise_threshold=1e-200)[:2] == (0, "noise")
+    assert gn._next_round(64, 1, 1e-3, noise_threshold=1e-200)[0] == 16
