@@ -118,41 +118,89 @@ std::vector<int> Posterior::near(const Box3& region, double reach, int most_rows
   return points;
 }
 
-Posterior::Block Posterior::solve(const std::vector<int>& points) const {
-  Block block;
-  JointRows& rows = block.rows;
-  rows.reset(*covariance_);
-  Counters counters;
-  for (const int i : points)
-    for (int r = conditions_.first_row(i); r < conditions_.last_row(i); ++r) {
-      const ConditionRows::Row& row = conditions_.rows()[r];
-      const JointRows::Known known =
-          rows.add_known(row.at, row.what, row.value, row.noise, counters);
-      if (rows.count() > static_cast<int>(block.conditions.size())) block.conditions.push_back(r);
-      if (known.left > kDetermined ||
-          std::abs(known.off) <
-              kContradiction * known.deviation * std::sqrt(std::max(known.left, JointRows::kPivot)))
-        continue;
-      int other = points.front();
-      double closest = -1;
-      for (int k = 0; k < r && closest < 1; ++k) {
-        const ConditionRows::Row& before = conditions_.rows()[k];
-        const double c = std::abs(covariance_->value(row.at, before.at));
-        if (before.point == i ||
-            std::find(points.begin(), points.end(), before.point) == points.end())
-          continue;
-        if (c > closest) other = before.point;
-        closest = std::max(closest, c);
-      }
-      refuse("conditions.points[", i, "] at ", row.at.x, " and conditions.points[", other, "] at ",
-             conditions_.point(other),
-             " contradict each other: with this kernel, what is known around the first leaves it "
-             "a standard deviation of ",
-             known.deviation * std::sqrt(std::max(known.left, 0.0)), ", and it is ",
-             std::abs(known.off),
-             " away. Remove one, move them apart, or give their values some noise.");
+// The rows in the order of what each tells beside those before (Cholesky with pivoting): where some
+// are determined by others, those that are kept then span all of them, and nothing is extrapolated.
+void Posterior::order_by_what_is_left(std::vector<int>& order) const {
+  const auto n = static_cast<Eigen::Index>(order.size());
+  const auto row = [&](Eigen::Index i) -> const ConditionRows::Row& {
+    return conditions_.rows()[order[i]];
+  };
+  const auto between = [&](Eigen::Index i, Eigen::Index j) {
+    return covariance_->between(row(i).at, row(i).what, row(j).at, row(j).what);
+  };
+  Eigen::MatrixXd factor(n, n);
+  Eigen::VectorXd variance(n), left(n);
+  for (Eigen::Index i = 0; i < n; ++i) left[i] = variance[i] = between(i, i) + row(i).noise;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    Eigen::Index next;
+    left.cwiseQuotient(variance).tail(n - k).maxCoeff(&next);
+    next += k;
+    if (!(left[next] > JointRows::kPivot * variance[next])) {
+      std::sort(order.begin() + k, order.end());
+      return;
     }
+    std::swap(order[k], order[next]);
+    std::swap(left[k], left[next]);
+    std::swap(variance[k], variance[next]);
+    factor.row(k).head(k).swap(factor.row(next).head(k));
+    const double pivot = std::sqrt(left[k]);
+    for (Eigen::Index i = k + 1; i < n; ++i) {
+      factor(i, k) = (between(i, k) - factor.row(i).head(k).dot(factor.row(k).head(k))) / pivot;
+      left[i] -= factor(i, k) * factor(i, k);
+    }
+  }
+}
+
+Posterior::Block Posterior::solve(const std::vector<int>& points) const {
+  std::vector<int> order;
+  for (const int i : points)
+    for (int r = conditions_.first_row(i); r < conditions_.last_row(i); ++r) order.push_back(r);
+  Block block;
+  if (add(order, false, block)) return block;
+  order_by_what_is_left(order);
+  add(order, true, block);
   return block;
+}
+
+// False where the order is not `sorted` and matters: others all but determine a row.
+bool Posterior::add(const std::vector<int>& order, bool sorted, Block& block) const {
+  block.rows.reset(*covariance_);
+  block.conditions.clear();
+  Counters counters;
+  for (const int r : order) {
+    const ConditionRows::Row& row = conditions_.rows()[r];
+    const JointRows::Known known =
+        block.rows.add_known(row.at, row.what, row.value, row.noise, counters);
+    if (known.left <= kDetermined && !sorted) return false;
+    const double deviation = known.deviation * std::sqrt(std::max(known.left, JointRows::kPivot));
+    if (known.left <= kDetermined && !(std::abs(known.off) < kContradiction * deviation))
+      refuse_contradiction(row, known, block);
+    if (block.rows.count() > static_cast<int>(block.conditions.size()))
+      block.conditions.push_back(r);
+  }
+  return true;
+}
+
+// Names the condition among those before that is closest by its correlation.
+void Posterior::refuse_contradiction(const ConditionRows::Row& row, const JointRows::Known& known,
+                                     const Block& block) const {
+  int other = row.point;
+  double closest = -1;
+  for (const int k : block.conditions) {
+    const ConditionRows::Row& before = conditions_.rows()[k];
+    const double c = std::abs(covariance_->value(row.at, before.at));
+    if (before.point != row.point && c > closest) {
+      other = before.point;
+      closest = c;
+    }
+  }
+  refuse("conditions.points[", row.point, "] at ", row.at.x, " and conditions.points[", other,
+         "] at ", conditions_.point(other),
+         " contradict each other: with this kernel, what is known around the first leaves it "
+         "a standard deviation of ",
+         known.deviation * std::sqrt(std::max(known.left, 0.0)), ", and it is ",
+         std::abs(known.off),
+         " away. Remove one, move them apart, or give their values some noise.");
 }
 
 int Posterior::block(const Vec3& x) const {

@@ -57,6 +57,10 @@ class Posterior {
   // Points near a region, the nearest first.
   std::vector<int> near(const Box3& region, double reach, int most_rows) const;
   Block solve(const std::vector<int>& points) const;
+  bool add(const std::vector<int>& order, bool sorted, Block& block) const;
+  void order_by_what_is_left(std::vector<int>& order) const;
+  void refuse_contradiction(const ConditionRows::Row& row, const JointRows::Known& known,
+                            const Block& block) const;
   double truncation(const Box3& region, int block) const;
 
   template <class Visit>
