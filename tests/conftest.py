@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy
 import pytest
+from statistics_checks import FAMILY_WISE, SIGNIFICANCE, Comparisons
 
 EXPECTED = [
     re.compile(line)
@@ -92,7 +93,8 @@ def pytest_configure(config):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_sessionfinish(session):
-    if _unexpected(session.config) and session.exitstatus == 0:
+    too_many = Comparisons.count * SIGNIFICANCE > FAMILY_WISE
+    if (too_many or _unexpected(session.config)) and session.exitstatus == 0:
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
@@ -100,6 +102,9 @@ def pytest_terminal_summary(terminalreporter, config):
     if os.environ.get("GPIS_TEST_FULL"):
         for text in config.stash[_figures]:
             terminalreporter.write_line(text)
+    family_wise = Comparisons.count * SIGNIFICANCE
+    verdict = "" if family_wise <= FAMILY_WISE else f", more than {FAMILY_WISE:g}: too many for the significance of one"
+    terminalreporter.write_line(f"{Comparisons.count} comparisons at a significance of {family_wise:.1e} together{verdict}")
     reasons, unexpected = config.stash[_reasons], _unexpected(config)
     terminalreporter.write_line(f"{sum(reasons.values())} skipped")
     for reason, count in sorted(reasons.items()):

@@ -1,20 +1,32 @@
 """Tests of hypotheses with a stated significance, shared by the statistical tests.
 
-SIGNIFICANCE is for one comparison: small enough that all comparisons of the suite together (some thousands) raise a
-false alarm with probability below 1e-3.
+SIGNIFICANCE is for one comparison: small enough that all comparisons of the suite together raise a false alarm with
+probability below FAMILY_WISE. The end of a test run says how many there were, and fails if they were too many for that.
 """
 
 import math
 
 import numpy as np
 
-SIGNIFICANCE = 1e-7
-Z_LIMIT = 5.33  # two-sided normal quantile of SIGNIFICANCE
+FAMILY_WISE = 1e-3
+SIGNIFICANCE = 3e-8
+Z_LIMIT = 5.542  # two-sided normal quantile of SIGNIFICANCE
+
+
+class Comparisons:
+    """How many this process has made."""
+
+    count = 0
+
+
+def count_comparisons(n):
+    Comparisons.count += n
 
 
 def check_z(value, expected, standard_error, what=""):
     """Two-sided z-test of a mean, element by element."""
     z = (np.asarray(value) - expected) / standard_error
+    count_comparisons(np.size(z))
     assert np.all(np.abs(z) < Z_LIMIT), f"{what}: z = {np.round(z, 2)}, {value} against {expected}"
 
 
@@ -27,6 +39,7 @@ def check_proportion(hits, n, expected, expected_error=0.0, what=""):
 
 def check_same_distribution(a, b, what=""):
     """Two-sample Kolmogorov-Smirnov test; infinite values take part as the largest."""
+    count_comparisons(1)
     a, b = np.sort(a), np.sort(b)
     both = np.concatenate([a[np.isfinite(a)], b[np.isfinite(b)]])
     distance = np.max(np.abs(np.searchsorted(a, both, "right") / len(a) - np.searchsorted(b, both, "right") / len(b)))

@@ -8,7 +8,7 @@ import gpis_native as gn
 import numpy as np
 import pytest
 from line_samplers import KERNELS, SERVED, factorises, worth
-from statistics_checks import SIGNIFICANCE, check_proportion, check_same_distribution, check_z
+from statistics_checks import SIGNIFICANCE, Z_LIMIT, check_proportion, check_same_distribution, check_z
 
 pytestmark = pytest.mark.stats
 every = pytest.mark.parametrize(("kernel", "sampler"), SERVED)
@@ -55,7 +55,7 @@ def test_mean_excursion(kernel, sampler, n, seed):
     t = np.minimum(t, 29)
     # Longer ones than the line are rare, and not much longer.
     beyond = 5 * np.mean(t == 29)
-    assert abs(t.mean() - pi / sqrt(KERNELS[kernel].derivative_variance(X))) < 5.33 * t.std() / sqrt(n) + beyond
+    assert abs(t.mean() - pi / sqrt(KERNELS[kernel].derivative_variance(X))) < Z_LIMIT * t.std() / sqrt(n) + beyond
 
 
 @every

@@ -4,7 +4,7 @@ samplers serve: one sampler against the other."""
 import gpis_native as gn
 import numpy as np
 import pytest
-from statistics_checks import SIGNIFICANCE, check_proportion, check_z
+from statistics_checks import SIGNIFICANCE, Z_LIMIT, check_proportion, check_z
 
 pytestmark = pytest.mark.stats
 LINE = ((-1, -1, -1), (12, 1, 1))  # bounds around the x axis, short enough for the dense sampler
@@ -75,7 +75,7 @@ def test_slope_of_wong_at_its_first_return(sampler, n, seed):
         np.sqrt(3) * h / (np.pi * u**2) * np.exp(-2 * (b * b - b * h + h * h) / u) * np.vectorize(erf)(np.sqrt(6 * b * h / u))
     )
     weight *= np.diff(u_edges)[:, None] * (h[:, 1] - h[:, 0])[:, None]
-    assert abs(weight.sum() - hit.mean()) < 5.33 * 0.5 / np.sqrt(n) + 1e-4
+    assert abs(weight.sum() - hit.mean()) < Z_LIMIT * 0.5 / np.sqrt(n) + 1e-4
     slope = (2 * h / np.sqrt(1 + u)).ravel()
     order = np.argsort(slope)
     expected = np.cumsum(weight.ravel()[order]) / weight.sum()

@@ -4,7 +4,8 @@ import gpis_native as gn
 import numpy as np
 import pytest
 from stability import anisotropy, conditions, fields, levels, memories, rays, scales, starts, transforms
-from stability.verdicts import REFUSED, RIGHT, Outcome, judge, of_cdf, of_sample, within
+from stability.verdicts import REFUSED, RIGHT, WRONG, Outcome, few_hits, judge, of_cdf, of_rate, of_sample, within
+from statistics_checks import Z_LIMIT
 
 pytestmark = pytest.mark.stats
 
@@ -35,7 +36,9 @@ def test_cell(cell):
 
 
 def test_keys_are_unique():
-    keys = [c.key for f in (scales, levels, anisotropy, conditions, starts, memories, rays, fields, transforms) for c in f.cells()]
+    keys = [
+        c.key for f in (scales, levels, anisotropy, conditions, starts, memories, rays, fields, transforms) for c in f.cells()
+    ]
     assert len(set(keys)) == len(keys)
 
 
@@ -59,6 +62,41 @@ def test_a_cell_that_is_off_is_wrong():
     cell = CELLS[0]
     assert judge(type(cell)("", "", "", refuse), 10)["status"] not in (RIGHT, REFUSED)
     assert judge(type(cell)("", "", "", lambda n: within(0, 0, 1, ""), refusal=True), 10)["status"] != RIGHT
+
+
+def hits_at(t):
+    n = len(t)
+    return {"t": np.asarray(t), "position": np.zeros((n, 3)), "gradient": np.ones((n, 3)), "counters": {}}
+
+
+def test_a_cell_that_cannot_fail_is_wrong():
+    t = np.random.default_rng(1).exponential(size=4)
+    cell = type(CELLS[0])
+    for outcome in (
+        of_cdf(t, lambda x: 1 - np.exp(-x), ""),
+        within(0.9, 1, 2.0, "", most=1.0),
+        of_rate(hits_at(t), 1, 1, 100, ""),
+    ):
+        row = judge(cell("", "", "", lambda n, outcome=outcome: outcome), 4)
+        assert row["status"] == WRONG and row["note"].startswith("cannot fail")
+    fails = of_cdf(np.full(1000, np.inf), lambda x: 1 - np.exp(-x), "")
+    assert within(0, 0, 2.0, "", most=1.0).joined(fails).status == WRONG
+    assert not fails.joined(within(0, 0, 2.0, "", most=1.0)).can_fail
+
+
+def test_rates_and_rare_hits(seed):
+    """As many as Rice says are right. Another rate shows: thrice the rate in 200 rays, a hundred times in 16."""
+    rng = np.random.default_rng(seed)
+    for n, off in ((16, 100), (200, 3)):
+        t = rng.exponential(size=n)
+        for fold, right in ((1, True), (0.9, True), (off, False), (1 / off, False)):
+            ends = np.where(t / fold < 8, t / fold, np.inf)
+            assert (of_rate(hits_at(ends), 1.0, 0.8, 8.0, "").status == RIGHT) == right, (n, fold)
+    never = np.full(1000, np.inf)
+    assert few_hits(hits_at(never), 1e-20, "").status == RIGHT
+    assert few_hits(hits_at(np.append(never, 1.0)), 1e-20, "").status != RIGHT
+    assert few_hits(hits_at(np.append(never, [1.0] * 3)), 1e-3, "").status == RIGHT
+    assert few_hits(hits_at(np.append(never, [1.0] * 20)), 1e-3, "").status != RIGHT
 
 
 def test_a_million_steps_are_the_most(seed):
@@ -88,4 +126,4 @@ def test_gradients_across_a_line_of_a_thin_process(sampler):
     gp = anisotropy.process(sampler, lengths, q, direction * far)
     hits = gn.first_hits(gp, np.zeros((n, 3)), np.tile(direction, (n, 1)), far, sampler=sampler, seed=5)
     _, _, across = anisotropy.whitened(hits, lengths, q, direction)
-    assert len(across) > 100 and abs(np.std(across) - 1) < 5.33 / np.sqrt(2 * len(across))
+    assert len(across) > 100 and abs(np.std(across) - 1) < Z_LIMIT / np.sqrt(2 * len(across))
