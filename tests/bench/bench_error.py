@@ -17,6 +17,7 @@ def bench_error(quick=False, again=False):
             if "found" in row:
                 b = row["found"]["bias"]
                 line |= {"samples": row["cell"]["samples"][-1], "seconds": row["found"]["seconds"][-1]}
+                line["set-up s"] = row["cell"]["setup_seconds"]
                 line |= {"relmse": row["found"]["relmse"][-1], "slope": row["found"]["slope"]}
                 line |= {"bias %": 100 * b["mean"], "+-": 100 * b["mean_error"], "paths/s": row["cell"]["paths_per_second"]}
             else:

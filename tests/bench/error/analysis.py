@@ -61,7 +61,8 @@ def evaluate(cell, images, reference, reference_variance):
     seconds = np.array(cell["seconds"])
     relmse = errors(images, reference, reference_variance)
     found = {
-        "seconds": seconds.mean(axis=0).tolist(),
+        "seconds": seconds.mean(axis=0).tolist(),  # of rendering alone: slope and cost are of these
+        "setup": cell["setup_seconds"] or 0.0,  # unknown for the paper's renderer: none is counted
         "relmse": relmse.mean(axis=0).tolist(),
         "relmse_error": (relmse.std(axis=0, ddof=1) / np.sqrt(len(relmse))).tolist(),
         "variance": variance(images, reference).tolist(),
@@ -75,15 +76,23 @@ def evaluate(cell, images, reference, reference_variance):
     return found
 
 
+def error_after(found, seconds):
+    """relMSE after so many seconds of the processor, set-up among them; None while that goes on: there is no pixel yet."""
+    rendering = seconds - found.get("setup", 0.0)
+    return found["floor"] + found["cost"] / rendering if rendering > 0 else None
+
+
 def ratio_at_equal_time(method, default, seconds):
-    """relMSE of the method over that of the default after the same seconds of the processor."""
-    return (method["floor"] + method["cost"] / seconds) / (default["floor"] + default["cost"] / seconds)
+    """relMSE of the method over that of the default after the same seconds; None where one of them has no pixel yet."""
+    theirs, ours = error_after(method, seconds), error_after(default, seconds)
+    return None if theirs is None or ours is None else theirs / ours
 
 
 def equal_time(found):
     """Of each of the paper's settings: title, and at PAPER_SECONDS its relMSE over the default's, the standard error that its
-    squared bias gives that, and whether it is measured: where the default's variance is below the error of its own squared
-    bias, the ratio rests on its having none. The paper's squared bias is taken as measured, not only where it is certain."""
+    squared bias gives that (both None where there is no pixel yet), and whether it is measured: where the default's variance is
+    below the error of its own squared bias, the ratio rests on its having none. The paper's squared bias is taken as measured,
+    not only where it is certain."""
     base = next((r["found"] for r in found["rows"] if r["key"] == "default" and "found" in r), None)
     rows = []
     for row in found["rows"]:
@@ -93,17 +102,24 @@ def equal_time(found):
         taken = row["found"] | {"floor": max(b["squared"], 0.0)}
         points = []
         for seconds in PAPER_SECONDS:
-            ours, error = base["floor"] + base["cost"] / seconds, base["bias"]["squared_error"]
-            points.append((ratio_at_equal_time(taken, base, seconds), b["squared_error"] / ours, ours >= error))
+            ours, ratio = error_after(base, seconds), ratio_at_equal_time(taken, base, seconds)
+            if ratio is None:
+                points.append((None, None, False))
+            else:
+                points.append((ratio, b["squared_error"] / ours, ours >= base["bias"]["squared_error"]))
         rows.append((row["title"], points))
     return rows
 
 
+def seconds_to(found, relmse):
+    """Seconds to reach an error, set-up among them; infinite below the floor of the bias."""
+    return found.get("setup", 0.0) + found["cost"] / (relmse - found["floor"]) if relmse > found["floor"] else np.inf
+
+
 def ratio_at_equal_error(method, default, relmse):
-    """Seconds to reach an error, over those of the default; infinite below the floor of the method's bias."""
-    if relmse <= method["floor"]:
-        return np.inf
-    return (method["cost"] / (relmse - method["floor"])) / (default["cost"] / (relmse - default["floor"]))
+    """Seconds to reach an error, over those of the default; None where the default never does."""
+    ours = seconds_to(default, relmse)
+    return seconds_to(method, relmse) / ours if np.isfinite(ours) else None
 
 
 def calibration(cell, images, reference, reference_variance):

@@ -1,17 +1,18 @@
 """One cell of the bench: a scene by a method, rendered several times to growing budgets, in a process of its own (so that
 its memory is its own, and a crash is a line of the report). A cell is a .json file, its pictures an .npz beside it."""
 
+import contextlib
 import json
 import multiprocessing
-import resource
 import time
 from dataclasses import dataclass
+from pathlib import Path
 
 import gpis_native as gn
 import numpy as np
 
 from . import published
-from .methods import default, methods_of, reference_of
+from .methods import default, drawn_by, methods_of, reference_of
 from .rates import paper_sphere_rate
 from .scenes import SCENES
 
@@ -57,9 +58,39 @@ def method_named(scene, key):
     return next(m for m in methods_of(scene) if m.key == key)
 
 
+def memory_mb(name):
+    """VmRSS, what this process holds, or VmHWM, the most it has held; None where the system does not say. (ru_maxrss of a
+    spawned process begins at the peak of the one that started it.)"""
+    try:
+        lines = Path("/proc/self/status").read_text().splitlines()
+    except OSError:
+        return None
+    return next((int(line.split()[1]) / 1024 for line in lines if line.startswith(name + ":")), None)
+
+
+def begin_peak():
+    """What the process holds, from where its peak is counted anew."""
+    with contextlib.suppress(OSError):  # not allowed everywhere; a cell's process has held little more before
+        Path("/proc/self/clear_refs").write_text("5")
+    return memory_mb("VmRSS")
+
+
+def set_up(make, size):
+    """The scene, and its set-up in seconds of the processor, those of all threads: the scene itself, and what its first render
+    takes beyond the second. That is its tables, which a process keeps: the first call in a process alone sees them."""
+    clock = [time.process_time()]
+    scene = gn.Scene(make())
+    clock.append(time.process_time())
+    for _ in range(2):
+        gn.render(scene, size, size, samples=1, seed=PILOT_SEED, threads=1)
+        clock.append(time.process_time())
+    made, first, second = np.diff(clock)
+    return scene, float(made + max(first - second, 0))
+
+
 def rate(description, size, seconds):
     """Paths per second of the processor, from a short render."""
-    gn.render(description, size, size, samples=1, seed=PILOT_SEED, threads=1)  # tables are made once
+    gn.render(description, size, size, samples=1, seed=PILOT_SEED, threads=1)  # tables are set-up
     paths, spent, sample = 0, 0.0, 0
     while spent < seconds and sample < 16 * BLOCK:
         start = time.process_time()
@@ -77,12 +108,11 @@ def doubled(largest):
     return steps
 
 
-def budgets(scene, method, effort, folder, planned):
+def budgets(scene, method, effort, folder, speed):
     """Samples per pixel: powers of two times 16 that the cell's seconds and its reference's seconds allow."""
     size = size_of(scene, effort)
     reference = gn.Scene(reference_of(scene, method).describe(scene, folder))
     repeats = effort.default_repeats if method.key == "default" else effort.repeats
-    speed = rate(planned, size, 0.05 * effort.seconds)
     reference_speed = rate(reference, size, 0.05 * effort.seconds)
     pixels = size * size
     allowed = min(effort.seconds * speed / (repeats * pixels), effort.reference_seconds * reference_speed / (100 * pixels))
@@ -110,7 +140,7 @@ def measure_published(scene, method, effort):
         "repeats": len(images),
         "seconds": [[samples * size * size / rate for samples in steps]] * len(images),
         "copy_seconds": time.process_time() - start,
-        "setup_seconds": None,
+        "setup_seconds": None,  # was not measured
         "paths_per_second": rate,
         "per_path": {name: count / paths for name, count in counters.items()},
         "memory_mb": None,
@@ -122,15 +152,14 @@ def measure(scene, method, effort, folder):
     """The cell as a dict for .json, and luminance (repeats, budgets, H, W)."""
     if method.group == "published":
         return measure_published(scene, method, effort)
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    start = time.process_time()
+    size, before = size_of(scene, effort), begin_peak()
     try:
-        planned = gn.Scene(method.describe(scene, folder))
+        planned, setup = set_up(lambda: method.describe(scene, folder), size)
     except ValueError as error:
         return {"refused": str(error)}, None
-    setup = time.process_time() - start
-    size = size_of(scene, effort)
-    steps, repeats = budgets(scene, method, effort, folder, planned)
+    speed, peak = rate(planned, size, 0.05 * effort.seconds), memory_mb("VmHWM")
+    # Only now, for tables and memory of the reference are not this method's.
+    steps, repeats = budgets(scene, method, effort, folder, speed)
     images = np.zeros((repeats, len(steps), size, size))
     seconds, estimates, counters = np.zeros(images.shape[:2]), np.zeros(images.shape[:2]), dict.fromkeys(COUNTERS, 0)
     for k in range(repeats):
@@ -155,7 +184,8 @@ def measure(scene, method, effort, folder):
         "setup_seconds": setup,
         "paths_per_second": paths / float(seconds[:, -1].sum()),
         "per_path": {name: count / paths for name, count in counters.items()},
-        "memory_mb": (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024,
+        "memory_mb": None if peak is None else peak - before,
+        "drawn_by": drawn_by(planned.plan()),
     }
     return cell, images
 

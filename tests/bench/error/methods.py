@@ -28,8 +28,26 @@ class Method:
 
 
 def default(scene):
-    title = f"default ({scene.default})" if scene.default else "default"
-    return Method("default", title, "sampler")
+    return Method("default", "default", "sampler")  # by which samplers, its cell says
+
+
+def drawn_by(plan):
+    """The samplers that the plan of a scene names, each once. Of an object that certain operands cut it is the one of that cut:
+    those of its leaves serve only the few rays that see the object twice."""
+    names, cut = [], set()
+    for row, text in plan.items():
+        thing, _, what = row.split(" of ")[0].partition(".")
+        if what == "cut":  # stands before the rows of the leaves
+            cut.add(thing)
+            text = text.split(" by ", 1)[1]
+        elif not what.endswith("sampler") or thing in cut:
+            continue
+        names.append(text.split(":")[0])
+    return [name for name in dict.fromkeys(names) if name != "none"]
+
+
+def published_title(scene, key):
+    return published.SETTINGS[key][0] + " (as timed)" * ((scene.name, key) == published.TIMED)
 
 
 def methods_of(scene):
@@ -37,7 +55,7 @@ def methods_of(scene):
     if scene.methods:
         methods += [Method(s, s, "sampler", sampler=s) for s in SAMPLERS if s != scene.default]
     if scene.name in published.SCENES:
-        methods += [Method(key, title, "published") for key, (title, _) in published.SETTINGS.items()]
+        methods += [Method(key, published_title(scene, key), "published") for key in published.SETTINGS]
     if scene.memories:
         methods += [Method(f"memory_{m}", f"memory {m}", "truth", memory=m) for m in MEMORIES]
     if scene.microfacet:

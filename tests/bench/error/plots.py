@@ -59,10 +59,10 @@ def guide(axes):
 
 
 def error_panel(axes, rows, title):
-    """rows: (key, title, evaluation). Points: error; thin line: the part that is variance; dotted: the bias floor; dashed: the
-    paper's method, whose seconds are by the rate of its renderer."""
+    """rows: (key, title, evaluation). Seconds are those of set-up and render. Points: error; thin line: the part that is
+    variance; dotted: the bias floor; dashed: the paper's method, whose seconds are by the rate of its renderer."""
     for key, label, found in rows:
-        color, seconds = COLORS.get(key, "#333333"), np.array(found["seconds"])
+        color, seconds = COLORS.get(key, "#333333"), found["setup"] + np.array(found["seconds"])
         relmse, spread = np.array(found["relmse"]), np.array(found["relmse_error"])
         shown = relmse > 0
         error = np.sqrt(np.maximum(relmse, 1e-12))
@@ -78,7 +78,7 @@ def error_panel(axes, rows, title):
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_title(title, loc="left")
-    axes.set_xlabel("seconds of one core")
+    axes.set_xlabel("seconds of one core, set-up and render")
     axes.legend(fontsize=7.5, loc="upper left", bbox_to_anchor=(0, -0.28), ncols=2)
     axes.set_ylabel("relative error, √relMSE")
     percent(axes.yaxis)

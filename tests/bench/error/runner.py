@@ -1,11 +1,12 @@
-"""A run: all cells, then the references they need, then the numbers. What is there from an earlier call of the same module is
-not done again; a changed module starts a new run, and the numbers of the last one stay for comparison."""
+"""A run: all cells, then the references they need, then the numbers. What is there from an earlier call is not done again; a
+changed module or a change of what is measured starts a new run, and the numbers of the last one stay for comparison."""
 
 import hashlib
 import json
 import os
 import platform
 import resource
+import shutil
 import sys
 import time
 from pathlib import Path
@@ -21,6 +22,7 @@ from .references import reference_image
 from .scenes import available
 
 OUT = Path(__file__).parents[3] / "out" / "bench" / "error"
+MEASURED_BY = ("scenes", "methods", "published", "references", "measure", "rates")  # what is kept depends on these
 REFERENCE_WEIGHT = 3  # of the bar, over a cell's
 
 
@@ -60,6 +62,13 @@ def module_hash():
     return hashlib.sha256(Path(gn.__file__).read_bytes()).hexdigest()[:16]
 
 
+def sources_hash():
+    digest = hashlib.sha256()
+    for name in MEASURED_BY:
+        digest.update(Path(__file__).with_name(name + ".py").read_bytes())
+    return digest.hexdigest()[:16]
+
+
 def processor():
     try:
         names = [line.split(":", 1)[1].strip() for line in Path("/proc/cpuinfo").read_text().splitlines() if "model name" in line]
@@ -69,20 +78,37 @@ def processor():
 
 
 def begin(folder, again):
-    """The run's own folder of cells, made anew where the module has changed."""
+    """The run's own folder, emptied where the module or what is measured has changed."""
     folder.mkdir(parents=True, exist_ok=True)
-    state, module = folder / "run.json", module_hash()
-    known = json.loads(state.read_text()) if state.exists() else None
-    if known is None or known["module"] != module or again:
+    state, made_by = folder / "run.json", {"module": module_hash(), "sources": sources_hash()}
+    known = json.loads(state.read_text()) if state.exists() else {}
+    if again or any(known.get(key) != value for key, value in made_by.items()):
         if (folder / "summary.json").exists():
             (folder / "summary.json").replace(folder / "previous.json")
-        for old in (folder / "cells").glob("*"):
-            old.unlink()
-        known = {"module": module, "begun": time.strftime("%Y-%m-%d %H:%M"), "yardstick": rates.yardstick()}
+        state.unlink(missing_ok=True)  # first: a call that is stopped here leaves nothing that looks like this run's
+        for old in ("cells", "references", "files"):
+            shutil.rmtree(folder / old, ignore_errors=True)
+        known = made_by | {"begun": time.strftime("%Y-%m-%d %H:%M"), "yardstick": rates.yardstick()}
         known |= {"processor": processor(), "threads": os.cpu_count()}
         state.write_text(json.dumps(known, indent=1) + "\n")
     (folder / "cells").mkdir(exist_ok=True)
     return known
+
+
+def end(folder, known, there):
+    """The yardstick again, where this call has measured more than the cells' files that were there: machines change speed."""
+    if "yardstick_end" not in known or there != kept(folder):
+        known["yardstick_end"] = rates.yardstick()
+        (folder / "run.json").write_text(json.dumps(known, indent=1) + "\n")
+
+
+def kept(folder):
+    return {path.name for path in (folder / "cells").iterdir()}
+
+
+def yardstick(known):
+    """Of a run: between its beginning and its end."""
+    return (known["yardstick"] + known["yardstick_end"]) / 2
 
 
 def cached(path, make):
@@ -137,6 +163,9 @@ def run(quick=False, again=False):
     files = folder / "files"
     known = begin(folder, again)
     scenes, missing = available()
+    there = kept(folder)
+    for scene in scenes:
+        scene.make("auto", "renewal+", files)  # what it paints into files is not set-up of the cell that would come first
     plan = [(scene, method) for scene in scenes for method in methods_for(scene, effort)]
     needed = {(s.name, reference_of(s, m).key) for s, m in plan}
     bar = Bar(len(plan) + REFERENCE_WEIGHT * len(needed) + len(scenes))
@@ -150,9 +179,10 @@ def run(quick=False, again=False):
         found.append(numbers(scene, effort, cells, references) | {"picture": preview(folder, scene, effort, files)})
         bar.step(1, f"numbers of {scene.name}")
     bar.end()
-    known |= {"effort": effort.name, "missing": missing, "scenes": found}
-    known["rates"] = cached(folder / "cells" / "rates.json", lambda: rates.measure_rates(2 if quick else 5, missing))
-    known["profile"] = cached(folder / "cells" / "profile.json", lambda: rates.sphere_profile(16 if quick else 256))
+    rate_rows = cached(folder / "cells" / "rates.json", lambda: rates.measure_rates(2 if quick else 5, missing))
+    profile = cached(folder / "cells" / "profile.json", lambda: rates.sphere_profile(16 if quick else 256))
+    end(folder, known, there)
+    known |= {"effort": effort.name, "missing": missing, "scenes": found, "rates": rate_rows, "profile": profile}
     previous = folder / "previous.json"
     known["previous"] = json.loads(previous.read_text()) if previous.exists() else None
     (folder / "summary.json").write_text(json.dumps(summary(known), indent=1) + "\n")
@@ -167,7 +197,10 @@ def numbers(scene, effort, cells, references):
         cell, images = cells.get((scene.name, method.key), nothing)
         if images is not None and (scene.name, reference.key) not in references:
             cell, images = nothing
-        row = {"key": method.key, "title": method.title, "group": method.group, "cell": cell}
+        title = method.title
+        if is_default(scene, method) and cell.get("drawn_by"):
+            title += f" ({', '.join(cell['drawn_by'])})"
+        row = {"key": method.key, "title": title, "group": method.group, "cell": cell}
         if images is not None:
             image, noise, samples = references[scene.name, reference.key]
             row["reference"] = {"title": reference.title, "samples": samples}
@@ -184,7 +217,7 @@ def summary(known):
     return {
         "module": known["module"],
         "begun": known["begun"],
-        "yardstick": known["yardstick"],
+        "yardstick": yardstick(known),
         "cells": {
             f"{found['scene'].name}.{row['key']}": {"rate": row["cell"]["paths_per_second"], "cost": row["found"]["cost"]}
             for found in known["scenes"]

@@ -21,7 +21,7 @@ class BenchScene:
     title: str
     what: str
     make: object  # (sampler, memory, folder for files it needs) -> description
-    default: str  # the sampler that `auto` takes
+    default: str  # the sampler that `auto` takes, of CSG for its leaves
     other: str  # another one, for the references
     methods: bool = False  # all methods, or the default one
     memories: bool = False  # all memory models too
