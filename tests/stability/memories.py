@@ -1,5 +1,11 @@
 """Every memory with every sampler, on smooth and on wild surfaces: where and how the second segment of a path ends,
-mirrored at the first hit, against another sampler (and the realisation against the convolution)."""
+mirrored at the first hit, against another sampler.
+
+Around a ball, most rays that are mirrored at a surface of σ = ℓ or less leave for good: these rays are inside a hollow one, along
+its wall, and every one of them hits it again. Of memory global-2, whose samplers (nystrom, dense) share how they keep a
+segment, and of which rough kernels have one only, the other sampler is the realisation with memory global: of a second
+segment two segments hold all.
+"""
 
 import gpis_native as gn
 import numpy as np
@@ -8,7 +14,7 @@ from line_samplers import JOINT, KERNELS, SAMPLERS
 from stability.verdicts import Cell, first_hits, of_sample
 
 MEMORIES = ["none", "renewal", "renewal+", "global-2", "global"]
-KINDS = {"σ = ℓ/10": 0.1, "σ = ℓ": 1.0, "σ = 10 ℓ": 10.0}
+KINDS = {"σ = ℓ/10, hollow": 0.1, "σ = ℓ, hollow": 1.0, "σ = 10 ℓ": 10.0}
 JOINT_ONLY = ("nystrom", "dense")  # that keep segments
 
 
@@ -28,15 +34,18 @@ def rows_of(state, rows):
 
 def second_segment(kernel, sampler, memory, ratio, n, seed):
     """t of the second segment; -1 where the first one hit nothing."""
-    gp = gn.GaussianProcess(gn.SphereField([0, 0, 0], 4), ratio, KERNELS[kernel], bounds=((-6,) * 3, (6,) * 3))
+    mean, origin, direction = gn.SphereField([0, 0, 0], 4), [0.9, 0.4, 5.9], np.array([0.0, 0, -1])
+    if ratio <= 1:
+        mean, origin, direction = mean * -1.0, [-0.7, 0.4, 3.7], np.array([1.0, 0, 0])
+    gp = gn.GaussianProcess(mean, ratio, KERNELS[kernel], bounds=((-6,) * 3, (6,) * 3))
     options = {"sampler": sampler, "memory": memory, "seed": seed}
-    first = first_hits(gp, n, [0.9, 0.4, 5.9], [0, 0, -1], 14, **options)
+    first = first_hits(gp, n, origin, direction, 14, **options)
     hit = np.isfinite(first["t"])
     t = np.full(n, -1.0)
     if not hit.any():
         return t, [first]
     normal = first["gradient"][hit] / np.linalg.norm(first["gradient"][hit], axis=1, keepdims=True)
-    incoming = np.tile([0.0, 0, -1], (hit.sum(), 1))
+    incoming = np.tile(direction, (hit.sum(), 1))
     away = incoming - 2 * np.sum(incoming * normal, axis=1, keepdims=True) * normal
     state = first["state"]
     state = rows_of(state, hit)
@@ -57,19 +66,20 @@ def reference_of(kernel, sampler, memory):
     if memory == "global":
         return "nystrom" if kernel == "squared exponential" else "dense", "global-2"
     if memory == "global-2":
-        return next((s for s in SAMPLERS[kernel] if s in JOINT_ONLY and s != sampler), sampler), memory
+        return "realisation", "global"
     return next((s for s in SAMPLERS[kernel] if s not in (sampler, "realisation")), "realisation"), memory
 
 
 def worth(kernel, sampler, memory, n):
-    slow = sampler == "realisation" or memory.startswith("global") or (sampler == "dense" and kernel in JOINT)
+    if memory.startswith("global"):
+        return max(150, n // (15 if kernel.startswith("sum") else 5))
+    slow = sampler == "realisation" or (sampler == "dense" and kernel in JOINT)
     return max(150, n // 20) if slow else max(200, n // 4) if sampler == "nystrom" else n
 
 
 def cell(kernel, sampler, memory, kind):
     def run(n):
         t, hits = second_segment(kernel, sampler, memory, KINDS[kind], worth(kernel, sampler, memory, n), 5)
-        # Memory of two segments holds all of a path that has no third: of the second, the law is that of memory global.
         other, its_memory = reference_of(kernel, sampler, memory)
         again, more = second_segment(kernel, other, its_memory, KINDS[kind], worth(kernel, other, its_memory, n), 7)
         against = other if its_memory == memory else f"{other}, {its_memory}"
@@ -88,4 +98,3 @@ def cells():
         if fits(sampler, memory)
         for kind in KINDS
     ]
-

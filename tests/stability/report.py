@@ -63,7 +63,9 @@ def picture(family, cells, path):
         axis.set_xlim(-0.5, len(columns) - 0.5)
         axis.set_ylim(len(part) - 0.5, -0.5)
         slanted = max(len(c) for c in columns) > 7
-        axis.set_xticks(range(len(columns)), columns, fontsize=8, rotation=40 if slanted else 0, ha="right" if slanted else "center")
+        axis.set_xticks(
+            range(len(columns)), columns, fontsize=8, rotation=40 if slanted else 0, ha="right" if slanted else "center"
+        )
         axis.set_yticks(range(len(part)), part, fontsize=8)
         axis.tick_params(length=0)
         for side in axis.spines.values():

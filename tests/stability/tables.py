@@ -7,7 +7,7 @@ from pathlib import Path
 from mpmath import diff, erfc, exp, log, matrix, mp, mpf, pi, sin, sqrt, workdps
 
 mp.dps = 120
-GRAM_DIGITS = 2400  # determinants of 30 points at a hundredth of a length scale are below 1e-1700
+GRAM_DIGITS = 2400  # determinants of 30 points at a hundredth of a length scale are below 1e-1700; the pivots of 200 above 1e-500
 SPACINGS = ["1", "0.3", "0.1", "0.03", "0.01", "0.001", "0.0001", "1e-06", "0"]
 DISTANCES = ["1e-08", "1e-07", "1e-06", "1e-05", "0.0001", "0.001", "0.01", "0.1", "1"]
 LEVELS = [-40, -30, -20, -10, -5, -2, 0, 2, 10, 20]
@@ -75,15 +75,16 @@ def posterior(kernel, spacing, count):
     probes = [float(p) for p in (last / 2, last * mpf("0.37"), last + mpf("0.25"), last + 1, mpf("-0.5"))]
     out = {"x": probes}
     for name, noise in (("deviation", mpf(0)), ("deviation_of_noisy", mpf("1e-8"))):
+        lags = [kernel(a) for a in x]
         gram = matrix(len(x))
-        for i, a in enumerate(x):
-            for j, b in enumerate(x):
-                gram[i, j] = kernel(abs(a - b)) + (noise if i == j else 0)
-        inverse = gram**-1
+        for i in range(len(x)):
+            for j in range(len(x)):
+                gram[i, j] = lags[abs(i - j)] + (noise if i == j else 0)
+        factors, order = mp.LU_decomp(gram)
         out[name] = []
         for p in probes:
             k = matrix([kernel(abs(mpf(p) - a)) for a in x])
-            left = 1 - (k.T * inverse * k)[0]
+            left = 1 - (k.T * mp.U_solve(factors, mp.L_solve(factors, k, order)))[0]
             out[name].append(float(sqrt(left)) if left > 0 else 0.0)
     return out
 
@@ -122,7 +123,7 @@ def main():
         "posterior": {
             f"{name}, {count}, {spacing}": posterior(kernel, spacing, count)
             for name, kernel in KERNELS.items()
-            for count in (2, 12, 30)
+            for count in (2, 12, 30, 200)
             for spacing in (SPACINGS if count < 30 else ["0.01"])
         },
         "start": {f"{name}, {q}": start(kernel, q) for name, kernel in LINES.items() for q in DISTANCES},
