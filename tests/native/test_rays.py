@@ -223,7 +223,10 @@ def test_visible_normals_by_other_samplers(sampler, degrees, alpha, n, seed, fig
     assert 2 * np.exp(-2 * len(seen) * max(distance - off, 0) ** 2) > SIGNIFICANCE, distance
 
 
-@pytest.mark.parametrize("mean", [gn.TorusField([0, 0, 0], [0.3, 0.2, 1], 0.5, 0.2), gn.BoxField([0, 0, 0], [1.6, 1.2, 0.4])], ids=["torus", "box"])
+TORUS, BOX = gn.TorusField([0, 0, 0], [0.3, 0.2, 1], 0.5, 0.2), gn.BoxField([0, 0, 0], [1.6, 1.2, 0.4])
+
+
+@pytest.mark.parametrize("mean", [TORUS, BOX], ids=["torus", "box"])
 @pytest.mark.parametrize("memory", ["renewal+", "global-1", "global"])
 def test_rays_that_leave_for_good(mean, memory, seed):
     """Means without bounds of which a distance is all that is known: a ray is not evaluated where it has no digits left for a
@@ -239,10 +242,9 @@ def test_rays_that_leave_for_good(mean, memory, seed):
 def test_a_stretch_above_ends_where_steps_are_below_rounding():
     """A leaf of a tree is looked ahead from where its mean is the threshold but for rounding: such a stretch is empty (and a
     search that waited for steps to become long again never ended)."""
-    torus, kernel = gn.TorusField([0, 0, 0], [0.3, 0.2, 1], 0.5, 0.2), gn.Matern(2.5, 1.0)
-    tree = gn.intersection(
-        gn.GaussianProcess(torus, 0.1, kernel), gn.GaussianProcess(gn.SphereField([0, 0, 0], 0.6), 0.05, kernel)
-    )
+    kernel = gn.Matern(2.5, 1.0)
+    sphere = gn.GaussianProcess(gn.SphereField([0, 0, 0], 0.6), 0.05, kernel)
+    tree = gn.intersection(gn.GaussianProcess(TORUS, 0.1, kernel), sphere)
     xy = np.random.default_rng(0).uniform(-1.4, 1.4, (2, 50))
     hits = gn.first_hits(tree, np.column_stack([*xy, np.full(50, 6.0)]), np.tile([0, 0, -1.0], (50, 1)), 12, memory="none", seed=1)
     assert np.isfinite(hits["t"]).sum() > 2 and hits["counters"]["line_step_limit"] == 0
