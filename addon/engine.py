@@ -87,9 +87,12 @@ def render_frame(engine, depsgraph):
         raise ValueError(sync.explain(state, str(error))) from error
     if result is None:
         return  # cancelled before there was anything to keep
+    lost = statistics.lost(result.stats)
+    for sentence in lost:
+        engine.report({"WARNING"}, sentence)
     plan = {sync.explain(state, key): sentence for key, sentence in native_scene.plan().items()}
     entry = statistics.record(
-        scene.name, view_layer.name, scene.frame_current, session, result, plan, state.warnings
+        scene.name, view_layer.name, scene.frame_current, session, result, plan, [*state.warnings, *lost]
     )
     # An F12 in the window writes no picture by itself, so there is nothing to write beside; the panel saves it.
     if scene.gpis.write_statistics and not watched and session.stop != "cancelled":

@@ -30,6 +30,24 @@ def record(scene_name, view_layer_name, frame, session, result, plan, warnings):
     return entry
 
 
+def lost(stats):
+    """Sentences for what the light of a render lacks: paths and rays that were ended by a limit, samples that were no number."""
+    sentences = []
+    if count := stats.get("path_length_limit", 0):
+        sentences.append(
+            f"{count:,} of {stats['camera_paths']:,} paths were ended after 100,000 bounces: their light is missing. "
+            "They are caught where no light is lost; set Bounces, or give the material a darker colour"
+        )
+    if count := stats.get("line_step_limit", 0):
+        sentences.append(
+            f"{count:,} rays were ended on their way through a stochastic surface, after a million steps: they met nothing. "
+            "Give it a longer length scale, or smaller bounds"
+        )
+    if count := stats.get("nan_samples", 0):
+        sentences.append(f"{count:,} samples were no numbers and are left out. Please report the scene")
+    return sentences
+
+
 def last(scene_name):
     return _last.get(scene_name)
 

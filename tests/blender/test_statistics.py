@@ -105,3 +105,17 @@ def test_the_plot_is_drawn_anew_for_a_new_render(stage, written, extension):
     assert icons[0][0] == icons[1][0] and not np.array_equal(icons[0][1], icons[1][1])
     assert np.array_equal(icons[1][1], icons[2][1])
     assert bpy.types.GPIS_PT_error_plot.poll(bpy.context) == (bpy.context.engine == "GPIS")
+
+
+def test_what_the_light_lacks_is_a_sentence(stage, written):
+    """A camera in a closed white box in the dark: every path bounces until the longest way that is followed has ended."""
+    support.settings(stage, width=2, height=2, samples=1)
+    support.cube(stage, "Box", 20.0, support.diffuse("White", (1, 1, 1)))
+    entry = json.loads(written()["GPIS-0.json"])
+    paths = entry["stats"]["camera_paths"]
+    assert entry["stats"]["path_length_limit"] == paths
+    assert entry["warnings"][-1].startswith(f"{paths} of {paths} paths were ended after 100,000 bounces: their light is missing.")
+
+
+def test_a_render_that_lacks_nothing_says_nothing(written):
+    assert json.loads(written()["GPIS-0.json"])["warnings"] == []
