@@ -1,5 +1,6 @@
 #include "process/tree_surface.h"
 
+#include <cmath>
 #include <stdexcept>
 
 #include "process/joint_line.h"
@@ -34,6 +35,36 @@ bool is_independent_union(const ProcessTree& tree) {
   for (const ProcessTree::Leaf& leaf : tree.leaves())
     if (leaf.sign < 0) return false;
   return true;
+}
+
+// Whether the bounds of a leaf end where it may be solid and others may be too; looked at on a
+// lattice on their faces.
+bool ends_inside(const ProcessTree& tree, const std::vector<ProcessSurface>& leaves, int leaf) {
+  constexpr int kPoints = 16;
+  const PlannedLine& plan = leaves[leaf].planned();
+  const Box3& box = plan.bounds;
+  if (!std::isfinite(length(box.max - box.min))) return false;
+  const auto held = [&](const Vec3& p) {
+    for (int k = 0; k < static_cast<int>(leaves.size()); ++k) {
+      const Box3& b = leaves[k].planned().bounds;
+      bool within = tree.leaves()[k].sign > 0;
+      for (int i = 0; i < 3; ++i) within = within && p[i] > b.min[i] && p[i] < b.max[i];
+      if (within) return true;
+    }
+    return false;
+  };
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double side : {box.min[axis], box.max[axis]})
+      for (int i = 0; i < kPoints * kPoints; ++i) {
+        const double u = (i % kPoints + 0.5) / kPoints, v = (i / kPoints + 0.5) / kPoints;
+        const int j = (axis + 1) % 3, k = (axis + 2) % 3;
+        Vec3 p;
+        p[axis] = side;
+        p[j] = box.min[j] + u * (box.max[j] - box.min[j]);
+        p[k] = box.min[k] + v * (box.max[k] - box.min[k]);
+        if (held(p) && plan.process->mean->value(p) < plan.skip_threshold) return true;
+      }
+  return false;
 }
 
 }  // namespace
@@ -172,9 +203,15 @@ std::vector<std::pair<std::string, std::string>> TreeSurface::plan() const {
     const auto cut = cut_->plan();
     rows.insert(rows.end(), cut.begin(), cut.end());
   }
-  for (std::size_t i = 0; i < leaves_.size(); ++i)
-    for (const auto& [key, text] : leaves_[i].plan())
-      rows.emplace_back("leaf[" + std::to_string(i) + "]." + key, text);
+  for (std::size_t i = 0; i < leaves_.size(); ++i) {
+    const std::string leaf = "leaf[" + std::to_string(i) + "].";
+    for (const auto& [key, text] : leaves_[i].plan()) rows.emplace_back(leaf + key, text);
+    if (tree_->leaves()[i].sign < 0 && ends_inside(*tree_, leaves_, static_cast<int>(i)))
+      rows.emplace_back(leaf + "warning_bounds",
+                        "It is subtracted, and its bounds end where it may be solid: bounds are no "
+                        "wall, what a ray sees there depends on the order of the operands. Give it "
+                        "wider bounds, or subtract what it has in common with a certain box.");
+  }
   return rows;
 }
 
