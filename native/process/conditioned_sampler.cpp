@@ -26,6 +26,9 @@ class ConditionedSampler final : public LineSampler {
   }
   double condition_pull() const override { return near_->condition_pull(); }
   double reach() const override { return std::min(near_->reach(), far_->reach()); }
+  double known_share() const override {
+    return std::min(near_->known_share(), far_->known_share());
+  }
   double correlation_error() const override {
     return std::max(near_->correlation_error(), far_->correlation_error());
   }

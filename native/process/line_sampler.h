@@ -32,6 +32,8 @@ class LineSampler {
   virtual double condition_pull() const { return 0; }
   // Length scales of a line within which that bound holds.
   virtual double reach() const { return kInfinity; }
+  // The share of the way across finite bounds for which it does.
+  virtual double known_share() const { return 1; }
   // Bound on |implied - exact correlation| of the path.
   virtual double correlation_error() const = 0;
 };

@@ -59,6 +59,10 @@ class MarchSampler final : public LineSampler {
     return kInfinity;
   }
 
+  double known_share() const override {
+    if constexpr (requires { plan_.known_share; }) return plan_.known_share;
+    return 1;
+  }
   double correlation_error() const override { return plan_.correlation_error; }
 
  private:

@@ -56,11 +56,15 @@ Mat3 whitening(const SymMat3& a) {
 // multiplies σ², definitions E9), and no grid where a constant does.
 std::shared_ptr<const GaussianProcess> normalised(const GaussianProcess& process) {
   auto out = std::make_shared<GaussianProcess>(process);
-  out->sigma = constant_if_it_is(process.sigma);
-  out->mean = constant_if_it_is(process.mean);
+  // Conditions are solved once for the same fields: these stay what they are.
+  if (!process.conditions) {
+    out->sigma = constant_if_it_is(process.sigma);
+    out->mean = constant_if_it_is(process.mean);
+  }
   if (const auto support = process.mean->support(); support && out->mean != process.mean)
     out->bounds = intersection(process.bounds.value_or(everywhere()), *support);
-  if (const auto a = process.anisotropy ? process.anisotropy->constant() : std::nullopt) {
+  const bool tensors = process.anisotropy && !process.conditions;
+  if (const auto a = tensors ? process.anisotropy->constant() : std::nullopt) {
     const Covariance refuses_what_takes_no_lengths(process);
     out->kernel = std::make_shared<TransformedKernel>(
         process.kernel, whitening(*a), std::sqrt(process.anisotropy->eigenvalues().min));
@@ -174,15 +178,15 @@ void check_length(const PlannedLine& plan, const Range& mean, const Range& sigma
         static_cast<long>(lengths), " length scales across: a ray may take more than the ",
         static_cast<long>(kMostSteps),
         " steps that are the most. Take a longer length_scale, smaller bounds, or a smaller mean.");
-  const double reach = plan.line_sampler ? plan.line_sampler->reach() : kInfinity;
-  if (missed_behind(reach, lengths, level) > missed_root)
+  const double known = plan.line_sampler ? plan.line_sampler->known_share() : 1;
+  if (missed_behind(known * lengths, lengths, level) > missed_root)
     refuse(
         "The mean of ", level,
-        " standard deviations is rarely met and nowhere certain, and the bounds are ",
-        static_cast<long>(lengths),
-        " length scales across: spectral lines of this kernel repeat themselves after ", reach,
-        ". Take a longer length_scale, smaller bounds, a smaller mean, or a squared exponential or "
-        "Matern kernel (sampler 'auto').");
+        " standard deviations is rarely met and nowhere certain, and spectral lines of this kernel "
+        "repeat themselves after ",
+        known, " of the way across the bounds, ", static_cast<long>(lengths),
+        " length scales. Take a longer length_scale, smaller bounds, a smaller mean, or a squared "
+        "exponential or Matern kernel (sampler 'auto').");
 }
 
 // Puts a table in the place of the march that draws it, where it serves the process.

@@ -129,24 +129,29 @@ void Posterior::order_by_what_is_left(std::vector<int>& order) const {
     return covariance_->between(row(i).at, row(i).what, row(j).at, row(j).what);
   };
   Eigen::MatrixXd factor(n, n);
-  Eigen::VectorXd variance(n), left(n);
-  for (Eigen::Index i = 0; i < n; ++i) left[i] = variance[i] = between(i, i) + row(i).noise;
+  Eigen::VectorXd variance(n), left(n), share(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    left[i] = variance[i] = between(i, i) + row(i).noise;
+    share[i] = variance[i] > 0;  // none of a slope along which g is constant
+  }
   for (Eigen::Index k = 0; k < n; ++k) {
     Eigen::Index next;
-    left.cwiseQuotient(variance).tail(n - k).maxCoeff(&next);
+    share.tail(n - k).maxCoeff(&next);
     next += k;
-    if (!(left[next] > JointRows::kPivot * variance[next])) {
+    if (!(share[next] > JointRows::kPivot)) {
       std::sort(order.begin() + k, order.end());
       return;
     }
     std::swap(order[k], order[next]);
     std::swap(left[k], left[next]);
     std::swap(variance[k], variance[next]);
+    std::swap(share[k], share[next]);
     factor.row(k).head(k).swap(factor.row(next).head(k));
     const double pivot = std::sqrt(left[k]);
     for (Eigen::Index i = k + 1; i < n; ++i) {
       factor(i, k) = (between(i, k) - factor.row(i).head(k).dot(factor.row(k).head(k))) / pivot;
       left[i] -= factor(i, k) * factor(i, k);
+      if (variance[i] > 0) share[i] = left[i] / variance[i];
     }
   }
 }

@@ -37,6 +37,7 @@ class SpectralPath {
     double correlation_error = 0;
     // Length scales after which a line comes to repeat itself; infinite where none is longer.
     double reach = kInfinity;
+    double known_share = 1;  // of the way across finite bounds, before that
   };
 
   void reset(const Plan& plan, const LineGeometry& line, double anchor, double t_end,

@@ -77,7 +77,11 @@ SpectralPath::Plan::Plan(const std::vector<Term>& terms, const Box3& bounds) {
       if (constant) break;
     }
     waves += most * per_frequency;
-    if (!constant && table.back().reach < longest[i]) reach = std::min(reach, table.back().reach);
+    if (!constant && table.back().reach < longest[i]) {
+      reach = std::min(reach, table.back().reach);
+      if (std::isfinite(longest[i]))
+        known_share = std::min(known_share, table.back().reach / longest[i]);
+    }
     tables.push_back(std::move(table));
   }
   for (const Component& c : components) {
