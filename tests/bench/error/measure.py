@@ -124,7 +124,7 @@ def measure_published(scene, method, effort):
     rate = paper_sphere_rate()
     if rate is None:
         return {"refused": "its rate is in baseline.json of the shared data, which is not beside this checkout"}, None
-    setting, size, steps = published.SETTINGS[method.key][1], size_of(scene, effort), doubled(effort.largest)
+    setting, size, steps = published.setting_of(scene.name, method.key), size_of(scene, effort), doubled(effort.largest)
     images = np.zeros((effort.published_repeats, len(steps), size, size))
     counters, start = dict.fromkeys(COUNTERS, 0), time.process_time()
     for k in range(len(images)):
