@@ -9,8 +9,8 @@ import math
 import numpy as np
 
 FAMILY_WISE = 1e-3
-SIGNIFICANCE = 3e-8
-Z_LIMIT = 5.542  # two-sided normal quantile of SIGNIFICANCE
+SIGNIFICANCE = 1e-9
+Z_LIMIT = 6.109  # two-sided normal quantile of SIGNIFICANCE
 
 
 class Comparisons:

@@ -82,7 +82,10 @@ std::vector<RealisationMemory> realisations_argument(const py::handle& argument,
     PyErr_Clear();
     throw std::invalid_argument(sentence);
   }
-  for (py::ssize_t i = 0; i < count; ++i) out[i].seed = seed.data()[i];
+  for (py::ssize_t i = 0; i < count; ++i) {
+    out[i].seed = seed.data()[i];
+    out[i].met = true;
+  }
   return out;
 }
 

@@ -14,9 +14,11 @@ template <class Value>
 double above_by_lipschitz(const Value& value, double rate, double t, double t_end,
                           double threshold) {
   constexpr int kSteps = 32;
+  constexpr double kGone = 1e100;  // squares of what lies behind are no numbers
   if (!std::isfinite(rate)) return t;
   const double begin = t;
   for (int i = 0; t < t_end; ++i) {
+    if (t > kGone) return t_end;
     const double gap = value(t) - threshold;
     if (!(gap > 0)) return t;
     if (rate == 0) return t_end;

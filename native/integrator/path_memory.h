@@ -45,8 +45,10 @@ class PathMemory {
     bodies_[b].begun = true;
     begun_.push_back(b);
     if (scene_.bodies[b].surface.memory() != Memory::global) return;
-    for (std::size_t i = scene_.bodies[b].first; RealisationMemory & kept : realisations(b))
-      kept = {realisation_seed_ + kGolden * i++, {}};
+    for (std::size_t i = scene_.bodies[b].first; RealisationMemory & kept : realisations(b)) {
+      kept = {};
+      kept.seed = realisation_seed_ + kGolden * i++;
+    }
   }
   // A ray of the path (not one towards a light) reaches its bounds.
   void enter(int b) {

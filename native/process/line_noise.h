@@ -17,6 +17,8 @@ class LineNoise {
   virtual void start_free(Rng& rng, Counters& counters, double& g, double& dg) = 0;
   virtual double start(const PathStart& known, Rng& rng, Counters& counters) = 0;
   virtual double pull(double t) const = 0;
+  // A realisation that an earlier ray of the path has seen.
+  virtual bool met_before() const { return false; }
   virtual void prepare(long cell, Rng& rng, Counters& counters) = 0;
   virtual void at_right(long cell, double& g, double& dg) = 0;
   virtual void at(long cell, double t, Rng& rng, double& g, double& dg) = 0;
@@ -43,6 +45,10 @@ class PathNoise final : public LineNoise {
     return path_.start(known, rng, counters);
   }
   double pull(double t) const override { return path_.pull(t); }
+  bool met_before() const override {
+    if constexpr (requires { path_.met_before(); }) return path_.met_before();
+    return false;
+  }
   void prepare(long cell, Rng& rng, Counters& counters) override {
     path_.prepare(cell, rng, counters);
   }

@@ -41,6 +41,7 @@ struct RealisationCondition {
 
 struct RealisationMemory {
   std::uint64_t seed = 0;
+  bool met = false;  // by a ray of the path
   // The first ray of the path that met the process found itself inside: the realisation was moved
   // outside there (definitions B4).
   RealisationCondition entry;

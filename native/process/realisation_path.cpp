@@ -76,7 +76,9 @@ void RealisationPath::draw(Rng& rng, Counters& counters) {
   if (drawn_) return;
   drawn_ = true;
   realisation_->draw(kept_ ? kept_->seed : rng(), plan_->process->time);
+  met_before_ = kept_ && kept_->met;
   if (kept_) {
+    kept_->met = true;
     for (RealisationCondition* c : {&kept_->entry, &kept_->moved})
       if (c->active && c->block < 0) c->solve(plan_->posterior.get());
     entry_ = kept_->entry;

@@ -41,6 +41,7 @@ class RealisationPath {
   void start_free(Rng& rng, Counters& counters, double& g, double& dg);
   double start(const PathStart& known, Rng& rng, Counters& counters);
   double pull(double) const { return pull_; }
+  bool met_before() const { return met_before_; }
   void prepare(long, Rng&, Counters& counters) { count(counters); }
   void at_right(long cell, double& g, double& dg) { evaluate(anchor_ + (cell + 1) * step_, g, dg); }
   void at(long, double t, Rng&, double& g, double& dg) { evaluate(t, g, dg); }
@@ -68,6 +69,7 @@ class RealisationPath {
   LineGeometry line_;
   double anchor_ = 0, step_ = 1, deviation_ = 0, pull_ = 0, added_norm_ = 0;
   bool drawn_ = false;
+  bool met_before_ = false;
   std::uint64_t counted_ = 0;
 
   // Of (g, ∇g) at the anchor, given the conditions.

@@ -7,11 +7,9 @@ namespace gpis {
 TreeHit TreeMarch::first_hit(const ProcessTree& tree, const ProcessTree* beyond,
                              std::span<const PlannedLine* const> plans,
                              const LineGeometry& geometry, std::span<Line> lines, double t_max,
-                             std::span<const Start> starts, bool kept, Rng& rng,
-                             Counters& counters) {
+                             std::span<const Start> starts, Rng& rng, Counters& counters) {
   tree_ = &tree;
   beyond_ = beyond;
-  kept_ = kept;
   rng_ = &rng;
   counters_ = &counters;
   hit_ = {};

@@ -22,13 +22,13 @@ struct TreeHit {
 // Reused from ray to ray: keeps its buffers.
 class TreeMarch {
  public:
-  // `starts`: one a leaf; a leaf with value 0 is the one whose surface the ray leaves. `kept`:
-  // paths are of realisations that are there already (memory `global`). `beyond`: the tree that a
-  // ray from inside sees once it has left the body by bounds, null for rays from outside.
+  // `starts`: one a leaf; a leaf with value 0 is the one whose surface the ray leaves. `beyond`:
+  // the tree that a ray from inside sees once it has left the body by bounds, null for rays from
+  // outside.
   TreeHit first_hit(const ProcessTree& tree, const ProcessTree* beyond,
                     std::span<const PlannedLine* const> plans, const LineGeometry& geometry,
-                    std::span<Line> lines, double t_max, std::span<const Start> starts, bool kept,
-                    Rng& rng, Counters& counters);
+                    std::span<Line> lines, double t_max, std::span<const Start> starts, Rng& rng,
+                    Counters& counters);
 
  private:
   static constexpr int kMaxSteps = 1 << 20;
@@ -86,9 +86,8 @@ class TreeMarch {
   Counters* counters_ = nullptr;
   TreeHit hit_;
   bool outside_ = true;  // F > 0 behind the last point
-  bool kept_ = false;
-  bool grew_ = false;  // a leaf was engaged: the step must be looked at again
-  double b_ = 0;       // the step's end
+  bool grew_ = false;    // a leaf was engaged: the step must be looked at again
+  double b_ = 0;         // the step's end
   TreeSample from_, to_;
   std::array<Level, kMaxDepth> levels_;
   std::vector<int> known_;  // signs at a, for odds: 0 where it is drawn

@@ -182,13 +182,14 @@ int TreeMarch::sign_in(const std::vector<Cut>& cuts, int part, int leaf) const {
 // -1: F > 0 says nothing of g, or cannot be had.
 int TreeMarch::choose_part(int noise, double a, double g, const std::vector<Cut>& cuts) {
   const int parts = static_cast<int>(cuts.size()) + 1;
+  const bool met = lines_.noises[noise].path->met_before();
   int possible = 0, last = -1, sure = 0;
   for (int part = 0; part < parts; ++part) {
     const int s = tree_->sign(
         tree_->root(), [&](int i) { return known_[i] != 0 ? known_[i] : sign_in(cuts, part, i); });
     if (s < 0) continue;
-    // A realisation that is there already is moved only where it cannot be.
-    if (kept_ && (part == 0 || cuts[part - 1].g < g) && (part + 1 == parts || g < cuts[part].g))
+    // A realisation that the path knows is moved only where it cannot be.
+    if (met && (part == 0 || cuts[part - 1].g < g) && (part + 1 == parts || g < cuts[part].g))
       return part;
     ++possible;
     sure += s > 0;

@@ -179,7 +179,7 @@ TreeHit TreeSurface::first_hit(March& march, std::span<Line> lines, const Ray& r
                           ? march.blended.first_hit(tree, beyond, plans_, geometry, lines, t_max,
                                                     starts, rng, counters)
                           : march.hard.first_hit(tree, beyond, plans_, geometry, lines, t_max,
-                                                 starts, kept, rng, counters);
+                                                 starts, rng, counters);
   keep(false);
   recall(false);
   return hit;

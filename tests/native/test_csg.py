@@ -279,6 +279,21 @@ def test_global_is_one_realisation_of_every_leaf(name, full_size, seed):
     assert compared > 0.4 * n
 
 
+def test_a_fresh_realisation_is_drawn_by_what_it_takes(seed):
+    """Definitions C7 under global too: of two solids that a ray enters by their bounds, half a deviation and three inside, the
+    first is the one that is drawn outside, in either order. The first operand used to stay as it had been realised (outside
+    for .31 of the paths), and the other was forced out instead: the light was 30 % off in one order."""
+    bounds, n = ((-1,) * 3, (1,) * 3), 2000
+    shallow, deep = (gn.GaussianProcess(mean, 0.2, gn.SquaredExponential(0.4), bounds=bounds) for mean in (-0.1, -0.6))
+    origins = np.column_stack([np.random.default_rng(seed).uniform(-0.9, 0.9, (n, 2)), np.full(n, 6.0)])
+    towards = np.tile([0, 0, -1.0], (n, 1))
+    for tree, outside in ((gn.intersection(shallow, deep), 0), (gn.intersection(deep, shallow), 1)):
+        lines, hits = (gn.first_hits(tree, origins, towards, 12, memory=m, seed=seed + outside) for m in ("none", "global"))
+        check_same_distribution(hits["t"], lines["t"], f"outside {outside}")
+        p = np.mean(lines["part"] == outside)
+        check_proportion(np.sum(hits["part"] == outside), n, p, np.sqrt(p * (1 - p) / n), "who is met")
+
+
 @pytest.mark.parametrize("name", GLOBAL)
 def test_first_hits_of_global_are_those_of_lines(name, n, seed):
     """A fresh path sees a fresh realisation: the law of the first hit is that of the samplers of lines."""

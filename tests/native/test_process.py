@@ -231,8 +231,8 @@ def test_what_is_not_needed_is_not_done(seed):
     origins, directions = np.tile([0.0, 0, 3], (1000, 1)), np.tile([0.0, 0, -1], (1000, 1))
     gp = gn.GaussianProcess(sphere, 0.05, kernel, bounds=((-1.5, -1.5, -1.5), (1.5, 1.5, 1.5)))
     assert gn.first_hits(gp, origins, directions, 10, seed=seed)["counters"]["sigma_lookups"] == 0
-    clamped = gn.GaussianProcess(sphere, gn.ConstantField(0.05).clamped(0, 1), kernel)
-    assert gn.first_hits(clamped, origins, directions, 10, seed=seed)["counters"]["sigma_lookups"] > 0
+    varying = gn.GaussianProcess(sphere, (gn.PlaneField([0, 0, 0], [0, 0, 1], 1e-3) + 0.05).clamped(0.01, 1), kernel)
+    assert gn.first_hits(varying, origins, directions, 10, seed=seed)["counters"]["sigma_lookups"] > 0
     dense = gn.first_hits(gp, origins, directions, 10, sampler="dense", seed=seed)["counters"]
     assert dense["factorisations"] <= 1  # the first use in this process, for all its rays
 

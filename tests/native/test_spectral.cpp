@@ -15,7 +15,7 @@
 namespace gpis {
 namespace {
 
-constexpr double kZ = 5.542;  // two-sided significance of 3e-8 for one comparison
+constexpr double kZ = 6.109;  // two-sided significance of 1e-9 for one comparison
 
 template <class K, class... Args>
 KernelPtr make(Args&&... args) {

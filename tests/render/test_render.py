@@ -165,10 +165,10 @@ def test_stats_are_plain_data(noisy):
 
 
 def test_samples_that_are_not_finite_are_told(noisy_scene, caplog):
-    """A lamp as bright as a double can be: what it lights is infinite, is left out, counted, and logged once."""
+    """A lamp all but as bright as a double can be, of next to no size: what it lights is infinite, is left out, counted, and
+    logged once."""
     description = noisy_scene()
-    description["lights"][0]["power"] = 1e308
-    description["lights"][0]["color"] = (1e308,) * 3
+    description["lights"][0] |= {"power": 1e306, "size": (1e-8, 1e-8)}
     with caplog.at_level(logging.WARNING, "gpis"):
         result = gn.render(gn.Scene(description), 10, 10, samples=32)
     assert result.stats["nan_samples"] > 0

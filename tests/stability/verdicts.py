@@ -13,8 +13,8 @@ from typing import Any
 
 import gpis_native as gn
 import numpy as np
-from statistics_checks import SIGNIFICANCE
 
+SIGNIFICANCE = 3e-8  # of a cell: of all 2,000 of a sweep, three comparisons each, 2e-4
 RIGHT, REFUSED, WRONG, ENDED = "right", "refused", "wrong", "ended"
 
 EVALUATIONS = ("line_evaluations",)

@@ -318,8 +318,8 @@ def scattered(rng, body, rays, distance, slope, setting, scatter):
     directions, albedo = scatter(rng, rays.direction, gradient / np.linalg.norm(gradient, axis=1, keepdims=True))
     return Rays(
         at=at, direction=directions, value=np.zeros(len(at)), slope=dot(gradient, directions),
-        gradient=(gradient - mean_gradient) / body.slope_scale, travelled=np.zeros(len(at)), weight=rays.weight * albedo,
-        pixel=rays.pixel,
+        gradient=(gradient - mean_gradient) / body.slope_scale, travelled=np.zeros(len(at)),
+        weight=rays.weight * albedo, pixel=rays.pixel,
     )  # fmt: skip
 
 
