@@ -276,7 +276,7 @@ def test_global_is_one_realisation_of_every_leaf(name, full_size, seed):
         if bounce == 0:
             hits = gn.first_hits(tree, origins, directions, 4, memory="global", start=state, seed=seed + 1)
             np.testing.assert_array_equal(hits["state"]["realisation"]["seed"], state["realisation"]["seed"])
-    assert compared > 0.4 * n
+    assert compared > 0.08 * n  # most are moved where all leaves are entered inside
 
 
 def test_a_fresh_realisation_is_drawn_by_what_it_takes(seed):
