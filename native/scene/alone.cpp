@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 
+#include "process/plan.h"
 #include "scene/check.h"
 
 namespace gpis {
@@ -27,12 +28,20 @@ bool meets_triangle(const Box3& box, const ObjectDescription& object, const Mesh
   return false;
 }
 
+// No ray ends on it.
+bool certainly_absent(const Scene::Impl::Body& body) {
+  if (!body.surface.tree().is_single()) return false;
+  const PlannedLine& plan = body.surface.leaves()[0].planned();
+  return plan.process->mean->range().min > plan.skip_threshold && !plan.process->conditions;
+}
+
 // The name of the first object whose rays may end inside of the body's bounds; null: none.
 const std::string* company(const SceneDescription& d, const Scene::Impl& scene,
                            const Scene::Impl::Body& body) {
   const Box3& box = body.surface.bounds();
   for (const Scene::Impl::Body& other : scene.bodies)
-    if (&other != &body && meet(box, other.surface.bounds())) return &d.objects[other.object].name;
+    if (&other != &body && meet(box, other.surface.bounds()) && !certainly_absent(other))
+      return &d.objects[other.object].name;
   for (const ObjectDescription& o : d.objects)
     if (o.type == ObjectDescription::Type::mesh && meets_triangle(box, o, d.meshes[o.mesh]))
       return &o.name;

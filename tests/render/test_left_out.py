@@ -122,6 +122,9 @@ def unused(folder):
     behind[2, 3] = 3000
     sheet = {"name": "Sheet", "type": "mesh", "mesh": "Sheet", "materials": ["Body"], "matrix": behind}
     apart_mesh = plain | {"meshes": {"Sheet": TRIANGLE}, "objects": [*plain["objects"], sheet]}
+    cloud = scene(gn.GaussianProcess(0.0, 0.01, gn.SquaredExponential(0.1), bounds=((-0.5,) * 3, (0.5,) * 3)))
+    nothing = gn.GaussianProcess(10.0, 0.05, gn.SquaredExponential(0.2), bounds=((-1,) * 3, (1,) * 3))
+    over_it = cloud | {"objects": [*cloud["objects"], cloud["objects"][0] | {"name": "Nothing", "process": nothing}]}
     material = plain | {"materials": plain["materials"] | {"Unused": {"type": "mirror", "color": (1, 1, 1)}}}
     return {
         "light": (plain, dark),
@@ -129,16 +132,20 @@ def unused(folder):
         "material": (plain, material),
         "object": (plain, apart),
         "mesh object": (plain, apart_mesh),
+        "absent object": (cloud, over_it),
         "grid of one sigma": (scene(ball(0.0625)), scene(ball(gn.GridField(np.full((2, 2, 2), 0.0625), 3.0, (-1.5,) * 3)))),
         "grid": of_grid,
     }
 
 
-@pytest.mark.parametrize("kind", ["light", "mesh", "material", "object", "mesh object", "grid", "grid of one sigma"])
+@pytest.mark.parametrize("kind", ["light", "mesh", "material", "object", "mesh object", "absent object", "grid", "grid of one sigma"])
 def test_what_is_not_used_changes_no_counter(kind, seed, tmp_path):
     plain, more = unused(tmp_path)[kind]
-    assert counted(plain, seed)["line_evaluations"] > 0
-    assert counted(plain, seed) == counted(more, seed)
+    stats, others = counted(plain, seed), counted(more, seed)
+    assert stats["line_evaluations"] + stats["line_tabulated"] > 0
+    if kind == "absent object":  # what tells that rays crossed its bounds, and that nothing was drawn
+        assert others.pop("line_skipped") > stats.pop("line_skipped")
+    assert stats == others
 
 
 def test_grids_that_are_the_same_everywhere_are_constants(seed):
