@@ -157,14 +157,16 @@ double steepest(const Kernel& kernel) {
 }
 
 // Of a constant mean and deviation: the probability that a ray meets the surface first behind so
-// many of the length scales that its bounds are across (Rice's rate, math.md §4).
+// many of the length scales that its bounds are across (Rice's rate, oracle 2).
 double missed_behind(double marched, double lengths, double level) {
   const double rate = std::exp(-0.5 * level * std::max(level, 0.0)) / (2 * kPi);  // a length scale
   return lengths > marched ? std::exp(-rate * marched) * -std::expm1(-rate * (lengths - marched))
                            : 0;
 }
 
-// Refuses lines that go on for longer than is marched or known, where that can be told.
+// Refuses lines that go on for longer than is marched or known, where that can be told: more of
+// them than roots may be missed would end in the middle of the process, or meet what they have met
+// before, without a word.
 void check_length(const PlannedLine& plan, const Range& mean, const Range& sigma,
                   double missed_root) {
   if (mean.min != mean.max || sigma.min != sigma.max || sigma.min == 0 ||
