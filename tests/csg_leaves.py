@@ -4,7 +4,7 @@ import gpis_native as gn
 import numpy as np
 from tensor_grids import along_x, isotropic
 
-BOUNDS = ((0, -3, -3), (4, 3, 3))  # rays run along the x axis from 0 to 4
+BOUNDS = ((-1, -3, -3), (5, 3, 3))  # rays run along the x axis from 0 to 4: no end of bounds has a part in it
 X = np.linspace(0, 4, 321)
 
 

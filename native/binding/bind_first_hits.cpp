@@ -33,7 +33,7 @@ py::dict first_hits_dict(const py::object& gp, const py::object& origins,
                                                  first_index, sampler, tolerance, seed, threads},
                                                 t_max);
   return hits_dict(without_python([&] { return first_hits(setup.surface, setup.query); }),
-                   setup.surface.leaves().size());
+                   setup.surface.operands());
 }
 
 NumberArray line_values_array(const py::object& gp, const py::object& origins,
@@ -54,7 +54,7 @@ NumberArray line_values_array(const py::object& gp, const py::object& origins,
   const auto values = without_python([&] { return line_values(setup.surface, setup.query, t); });
   std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(setup.query.rays.size()),
                                  static_cast<py::ssize_t>(t.size())};
-  if (setup.surface.leaves().size() > 1) shape.push_back(setup.surface.leaves().size());
+  if (setup.surface.operands() > 1) shape.push_back(setup.surface.operands());
   NumberArray out(shape);
   std::copy(values.begin(), values.end(), out.mutable_data());
   return out;

@@ -10,7 +10,7 @@
 #include "binding/conditions_argument.h"
 #include "process/at_points.h"
 #include "process/posterior.h"
-#include "process/surface.h"
+#include "process/tree_surface.h"
 
 namespace gpis {
 namespace py = pybind11;
@@ -163,7 +163,9 @@ void bind_process(py::module_& m) {
           [](const std::shared_ptr<GaussianProcess>& gp) {
             py::dict out;
             for (const auto& [key, text] :
-                 ProcessSurface(gp, {}, Memory::renewal_plus, Sampler::automatic, 1e-3).plan())
+                 TreeSurface(ProcessTree::single(gp), {}, Memory::renewal_plus, Sampler::automatic,
+                             1e-3)
+                     .plan())
               out[py::str(key)] = text;
             return out;
           },

@@ -281,10 +281,10 @@ FirstHitsQuery query_argument(const FirstHitsArguments& arguments, std::size_t l
 }  // namespace
 
 FirstHitsSetup first_hits_setup(const FirstHitsArguments& arguments, double t_max) {
-  const TreePtr tree = tree_argument(arguments.gp, "gp");
-  FirstHitsQuery query = query_argument(arguments, tree->leaves().size(), t_max);
-  TreeSurface surface(tree, {}, memory_argument(arguments.memory, "memory"),
+  TreeSurface surface(tree_argument(arguments.gp, "gp"), {},
+                      memory_argument(arguments.memory, "memory"),
                       sampler_argument(arguments.sampler), tolerance_argument(arguments.tolerance));
+  FirstHitsQuery query = query_argument(arguments, surface.operands(), t_max);
   if (!query.inside.empty()) surface.serve_inside();
   return {std::move(surface), std::move(query)};
 }

@@ -13,6 +13,15 @@
 namespace gpis {
 namespace {
 
+// What a ray that starts at a point knows of a wall: on it or not, all of it.
+State state_of_wall(const ProcessSurface& wall, const Vec3& origin) {
+  constexpr double kOn = 1e-9;
+  const Field& box = *wall.planned().process->mean;
+  const FieldSample s = box.sample(origin);
+  return {std::abs(s.value) < kOn * (box.smooth_scale() + length(origin)) ? 0 : s.value,
+          s.gradient};
+}
+
 // Calls visit(row, lines, hit, rng, counters) for every ray, in parallel.
 template <class Visit>
 Counters for_each_hit(const TreeSurface& surface, const FirstHitsQuery& query,
@@ -26,23 +35,28 @@ Counters for_each_hit(const TreeSurface& surface, const FirstHitsQuery& query,
   tbb::enumerable_thread_specific<Worker> workers;
   tbb::task_arena arena(query.threads > 0 ? query.threads : tbb::task_arena::automatic);
   std::atomic<bool> stop = false;
-  const std::size_t leaves = surface.leaves().size();
+  const std::size_t leaves = surface.leaves().size(), operands = surface.operands();
   const auto trace = [&](std::size_t i, Worker& worker) {
     Rng rng(query.seed, query.first_index + i);
     std::vector<RealisationMemory> fresh;
     RealisationMemory* kept = nullptr;
     if (surface.memory() == Memory::global) {
-      if (realisations.empty()) fresh.resize(leaves);
-      kept = realisations.empty() ? fresh.data() : &realisations[i * leaves];
-      for (std::size_t k = 0; k < leaves && query.realisation.empty(); ++k) kept[k].seed = rng();
+      if (realisations.empty()) fresh.resize(operands);
+      kept = realisations.empty() ? fresh.data() : &realisations[i * operands];
+      for (std::size_t k = 0; k < operands && query.realisation.empty(); ++k) kept[k].seed = rng();
     }
     const bool inside = !query.inside.empty() && query.inside[i];
-    for (std::size_t k = 0; k < leaves; ++k) {
-      const State* state = query.start.empty() ? nullptr : &query.start[i * leaves + k];
+    for (std::size_t k = operands; k < leaves; ++k) {
+      const State on_wall = state_of_wall(surface.leaves()[k], query.rays[i].origin);
+      worker.starts[k] =
+          surface.leaves()[k].start_from(query.start.empty() ? nullptr : &on_wall, inside);
+    }
+    for (std::size_t k = 0; k < operands; ++k) {
+      const State* state = query.start.empty() ? nullptr : &query.start[i * operands + k];
       if (state && std::isnan(state->value)) state = nullptr;
       worker.starts[k] = surface.leaves()[k].start_from(
           state, inside, kept ? kept + k : nullptr,
-          query.segments.empty() ? nullptr : &query.segments[i * leaves + k]);
+          query.segments.empty() ? nullptr : &query.segments[i * operands + k]);
     }
     const TreeHit hit = surface.first_hit(worker.march, worker.lines, query.rays[i], query.t_max,
                                           worker.starts, rng, worker.counters);
@@ -75,18 +89,19 @@ FirstHits first_hits(const TreeSurface& surface, const FirstHitsQuery& query) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   constexpr Vec3 nowhere{nan, nan, nan};
   const std::size_t rays = query.rays.size(), leaves = surface.leaves().size();
+  const std::size_t operands = surface.operands();
   FirstHits result;
   result.t.assign(rays, kInfinity);
   result.leaf.assign(rays, -1);
   result.position.assign(rays, nowhere);
   result.gradient.assign(rays, nowhere);
-  result.state_value.assign(rays * leaves, nan);
-  result.state_gradient.assign(rays * leaves, nowhere);
+  result.state_value.assign(rays * operands, nan);
+  result.state_gradient.assign(rays * operands, nowhere);
   result.realisation = query.realisation;
-  if (surface.memory() == Memory::global) result.realisation.resize(rays * leaves);
+  if (surface.memory() == Memory::global) result.realisation.resize(rays * operands);
   if (surface.memory() == Memory::segments) {
     result.segments = query.segments;
-    result.segments.resize(rays * leaves);
+    result.segments.resize(rays * operands);
   }
   result.counters = for_each_hit(
       surface, query, result.realisation,
@@ -95,7 +110,7 @@ FirstHits first_hits(const TreeSurface& surface, const FirstHitsQuery& query) {
         // A ray inside that leaves by bounds has no hit, as one that leaves a process of its own.
         if (hit.leaf < 0 || hit.left < kInfinity) return;
         result.t[i] = hit.t;
-        result.leaf[i] = hit.leaf;
+        result.leaf[i] = surface.operand(hit.leaf);
         result.position[i] = query.rays[i].at(hit.t);
         std::vector<std::optional<State>> states(leaves);
         std::optional<HitGradient> found;
@@ -119,12 +134,12 @@ FirstHits first_hits(const TreeSurface& surface, const FirstHitsQuery& query) {
         }
         if (last) draw();
         found->remember(result.gradient[i], states);
-        for (std::size_t k = 0; k < leaves; ++k) {
+        for (std::size_t k = 0; k < operands; ++k) {
           if (!states[k]) continue;
-          result.state_value[i * leaves + k] = states[k]->value;
-          result.state_gradient[i * leaves + k] = states[k]->gradient;
+          result.state_value[i * operands + k] = states[k]->value;
+          result.state_gradient[i * operands + k] = states[k]->gradient;
           if (result.segments.empty()) continue;
-          SegmentMemory& kept = result.segments[i * leaves + k];
+          SegmentMemory& kept = result.segments[i * operands + k];
           surface.leaves()[k].keep_segment(lines[k], hit.t, kept);
           surface.leaves()[k].keep_end(result.position[i], *states[k], kept);
         }
@@ -134,7 +149,7 @@ FirstHits first_hits(const TreeSurface& surface, const FirstHitsQuery& query) {
 
 std::vector<double> line_values(const TreeSurface& surface, const FirstHitsQuery& query,
                                 const std::vector<double>& t) {
-  const std::size_t leaves = surface.leaves().size();
+  const std::size_t leaves = surface.operands();
   std::vector<double> values(query.rays.size() * t.size() * leaves,
                              std::numeric_limits<double>::quiet_NaN());
   std::vector<RealisationMemory> realisations = query.realisation;

@@ -41,7 +41,7 @@ bool same_noise(const GaussianProcess& a, const GaussianProcess& b) {
 
 }  // namespace
 
-TreePtr ProcessTree::single(std::shared_ptr<const GaussianProcess> process) {
+TreePtr ProcessTree::single(ProcessPtr process) {
   auto tree = std::make_shared<ProcessTree>();
   tree->leaves_ = {{std::move(process), 1, 0, 0}};
   tree->nodes_ = {{Kind::leaf, 0, 0, {}}};
@@ -111,6 +111,31 @@ TreePtr ProcessTree::complement(const ProcessTree& of) {
   for (Node& node : tree->nodes_)
     if (node.kind != Kind::leaf)
       node.kind = node.kind == Kind::least ? Kind::greatest : Kind::least;
+  return tree;
+}
+
+TreePtr ProcessTree::cut(const std::vector<ProcessPtr>& boxes) const {
+  auto tree = std::make_shared<ProcessTree>(*this);
+  tree->nodes_.clear();
+  std::vector<int> moved;  // where a node is now
+  for (Node node : nodes_) {
+    for (int& child : node.children) child = moved[child];
+    tree->nodes_.push_back(node);
+    if (node.kind == Kind::leaf && boxes[node.leaf]) {
+      // The box comes first: nothing is drawn of the leaf where it decides.
+      const int leaf = tree->root(), box = leaf + 1;
+      Leaf certain = leaves_[node.leaf];
+      certain.process = boxes[node.leaf];
+      certain.noise = tree->noises_++;
+      Node both{certain.sign > 0 ? Kind::greatest : Kind::least, -1, node.noise, {box, leaf}};
+      node.leaf = static_cast<int>(tree->leaves_.size());
+      node.noise = certain.noise;
+      tree->leaves_.push_back(std::move(certain));
+      tree->nodes_.push_back(node);
+      tree->nodes_.push_back(std::move(both));
+    }
+    moved.push_back(tree->root());
+  }
   return tree;
 }
 

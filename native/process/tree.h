@@ -19,9 +19,10 @@ using TreePtr = std::shared_ptr<const ProcessTree>;
 
 class ProcessTree {
  public:
+  using ProcessPtr = std::shared_ptr<const GaussianProcess>;
   enum class Kind { leaf, least, greatest };
   struct Leaf {
-    std::shared_ptr<const GaussianProcess> process;
+    ProcessPtr process;
     double sign = 1;  // -1: the leaf counts as its complement
     int noise = 0;    // leaves of one number see the same g
     // Blend radii above it, summed up: F takes its sign from others wherever the leaf is farther
@@ -36,13 +37,17 @@ class ProcessTree {
     double blend = 0;  // two children; 0: no blend
   };
 
-  static TreePtr single(std::shared_ptr<const GaussianProcess> process);
+  static TreePtr single(ProcessPtr process);
   // `shared_noise`: all leaves below see the same g. Throws std::invalid_argument where their
   // kernels differ. `name` is what the caller calls it. `blend`: radius of a smooth union or
   // intersection, of the parts one after the other.
   static TreePtr combine(Kind kind, const std::vector<TreePtr>& parts, bool shared_noise,
                          const std::string& name, double blend = 0);
   static TreePtr complement(const ProcessTree& tree);
+
+  // Leaf k cut by boxes[k] where that is not null: certain processes, which become leaves behind
+  // all others.
+  TreePtr cut(const std::vector<ProcessPtr>& boxes) const;
 
   // The same tree of other processes; one object that is several leaves stays one.
   template <class Change>

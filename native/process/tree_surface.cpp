@@ -5,6 +5,7 @@
 
 #include "process/joint_line.h"
 #include "process/realisation_path.h"
+#include "process/walls.h"
 
 namespace gpis {
 namespace {
@@ -37,43 +38,11 @@ bool is_independent_union(const ProcessTree& tree) {
   return true;
 }
 
-// Whether the bounds of a leaf end where it may be solid and others may be too; looked at on a
-// lattice on their faces.
-bool ends_inside(const ProcessTree& tree, const std::vector<ProcessSurface>& leaves, int leaf) {
-  constexpr int kPoints = 16;
-  const PlannedLine& plan = leaves[leaf].planned();
-  const Box3& box = plan.bounds;
-  if (!std::isfinite(length(box.max - box.min))) return false;
-  const auto held = [&](const Vec3& p) {
-    for (int k = 0; k < static_cast<int>(leaves.size()); ++k) {
-      const Box3& b = leaves[k].planned().bounds;
-      bool within = tree.leaves()[k].sign > 0;
-      for (int i = 0; i < 3; ++i) within = within && p[i] > b.min[i] && p[i] < b.max[i];
-      if (within) return true;
-    }
-    return false;
-  };
-  for (int axis = 0; axis < 3; ++axis)
-    for (const double side : {box.min[axis], box.max[axis]})
-      for (int i = 0; i < kPoints * kPoints; ++i) {
-        const double u = (i % kPoints + 0.5) / kPoints, v = (i / kPoints + 0.5) / kPoints;
-        const int j = (axis + 1) % 3, k = (axis + 2) % 3;
-        Vec3 p;
-        p[axis] = side;
-        p[j] = box.min[j] + u * (box.max[j] - box.min[j]);
-        p[k] = box.min[k] + v * (box.max[k] - box.min[k]);
-        if (held(p) && plan.process->mean->value(p) < plan.skip_threshold) return true;
-      }
-  return false;
-}
-
 }  // namespace
 
 TreeSurface::TreeSurface(TreePtr tree, const Affine& object_to_world, Memory memory,
                          Sampler sampler, double missed_root)
-    : tree_(std::move(tree)),
-      inside_out_(ProcessTree::complement(*tree_)),
-      independent_union_(is_independent_union(*tree_)) {
+    : tree_(std::move(tree)), composition_(tree_->describe()) {
   const auto& leaves = tree_->leaves();
   for (std::size_t i = 0; i < leaves.size(); ++i) {
     try {
@@ -91,9 +60,22 @@ TreeSurface::TreeSurface(TreePtr tree, const Affine& object_to_world, Memory mem
       throw std::invalid_argument("Operand " + std::to_string(i) + ": " + error.what());
     }
   }
+  add_walls(object_to_world, memory, sampler, missed_root);
+  inside_out_ = ProcessTree::complement(*tree_);
+  independent_union_ = is_independent_union(*tree_);
   for (const ProcessSurface& leaf : leaves_) plans_.push_back(&leaf.planned());
   bounds_ = box_of(*tree_, tree_->root(), leaves_);
   cut_ = CertainCut::of(*tree_, leaves_, memory, sampler, uncut_);
+}
+
+void TreeSurface::add_walls(const Affine& object_to_world, Memory memory, Sampler sampler,
+                            double missed_root) {
+  const auto boxes = walls(*tree_, leaves_);
+  tree_ = tree_->cut(boxes);
+  for (std::size_t k = leaves_.size(); k < tree_->leaves().size(); ++k)
+    leaves_.emplace_back(tree_->leaves()[k].process, object_to_world, memory, sampler, missed_root);
+  for (std::size_t i = 0; i < boxes.size(); ++i)
+    if (boxes[i]) walled_.push_back(static_cast<int>(i));
 }
 
 void TreeSurface::serve_inside() {
@@ -186,12 +168,29 @@ TreeHit TreeSurface::first_hit(March& march, std::span<Line> lines, const Ray& r
 }
 
 std::vector<std::pair<std::string, std::string>> TreeSurface::plan() const {
-  if (leaves_.size() == 1 && tree_->is_single()) return leaves_[0].plan();
+  const bool single = operands() == 1 && sign(0) > 0;
+  const auto add_leaves = [&](auto& rows) {
+    const auto leaf = [&](std::size_t i) {
+      return single ? "" : "leaf[" + std::to_string(operand(i)) + "].";
+    };
+    for (std::size_t i = 0; i < operands(); ++i)
+      for (const auto& [key, text] : leaves_[i].plan()) rows.emplace_back(leaf(i) + key, text);
+    for (std::size_t i = operands(); i < leaves_.size(); ++i)
+      rows.emplace_back(
+          leaf(i) + "wall",
+          sign(operand(i)) > 0
+              ? "its bounds: they cut it where it is solid for certain"
+              : "its bounds: it is subtracted, and they end where others may be solid");
+  };
   std::vector<std::pair<std::string, std::string>> rows;
+  if (single) {
+    add_leaves(rows);
+    return rows;
+  }
   const bool shared = tree_->noises() < static_cast<int>(leaves_.size());
   rows.emplace_back(
       "composition",
-      tree_->describe() + ", composed per realisation; noise " +
+      composition_ + ", composed per realisation; noise " +
           (shared ? "shared by some leaves" : "independent") +
           (independent_union_ ? "; every leaf marched for itself, the first hit wins"
            : tree_->has_blends()
@@ -203,15 +202,7 @@ std::vector<std::pair<std::string, std::string>> TreeSurface::plan() const {
     const auto cut = cut_->plan();
     rows.insert(rows.end(), cut.begin(), cut.end());
   }
-  for (std::size_t i = 0; i < leaves_.size(); ++i) {
-    const std::string leaf = "leaf[" + std::to_string(i) + "].";
-    for (const auto& [key, text] : leaves_[i].plan()) rows.emplace_back(leaf + key, text);
-    if (tree_->leaves()[i].sign < 0 && ends_inside(*tree_, leaves_, static_cast<int>(i)))
-      rows.emplace_back(leaf + "warning_bounds",
-                        "It is subtracted, and its bounds end where it may be solid: bounds are no "
-                        "wall, what a ray sees there depends on the order of the operands. Give it "
-                        "wider bounds, or subtract what it has in common with a certain box.");
-  }
+  add_leaves(rows);
   return rows;
 }
 

@@ -16,8 +16,14 @@ class TreeSurface {
   TreeSurface(TreePtr tree, const Affine& object_to_world, Memory memory, Sampler sampler,
               double missed_root);
 
+  // With walls (walls.h), as leaves behind those of the tree as it was given, its operands.
   const ProcessTree& tree() const { return *tree_; }
   const std::vector<ProcessSurface>& leaves() const { return leaves_; }
+  std::size_t operands() const { return leaves_.size() - walled_.size(); }
+  // The operand that a leaf belongs to: a wall to what it ends.
+  int operand(std::size_t leaf) const {
+    return leaf < operands() ? static_cast<int>(leaf) : walled_[leaf - operands()];
+  }
   Memory memory() const { return leaves_[0].memory(); }
   // -1 where F falls as the leaf grows: gradients of F are those of the leaf times this.
   double sign(int leaf) const { return tree_->leaves()[leaf].sign; }
@@ -50,9 +56,13 @@ class TreeSurface {
   std::vector<std::pair<std::string, std::string>> plan() const;
 
  private:
+  void add_walls(const Affine& object_to_world, Memory memory, Sampler sampler, double missed_root);
+
   TreePtr tree_, inside_out_;
-  bool independent_union_;
+  bool independent_union_ = false;
   std::vector<ProcessSurface> leaves_;
+  std::vector<int> walled_;
+  std::string composition_;  // of the tree as it was given
   std::optional<CertainCut> cut_;
   std::string uncut_;  // why there is none
   std::vector<const PlannedLine*> plans_;

@@ -126,7 +126,7 @@ void Scene::build_objects() {
       const TreeSurface& surface = impl_->bodies.back().surface;
       check_bounds(surface.bounds(), EntryPath("objects", i, o.name) + ".matrix");
       for (std::size_t k = 0; k < surface.leaves().size(); ++k) {
-        const int material = o.materials[o.materials.size() == 1 ? 0 : k];
+        const int material = o.materials[o.materials.size() == 1 ? 0 : surface.operand(k)];
         impl_->stochastic.push_back(
             {surface.leaves()[k], impl_->materials[material].get(), o.albedo, inverse(o.matrix)});
       }

@@ -244,19 +244,3 @@ def test_a_leaf_is_drawn_with_what_it_matters_with(n, seed):
         first = first[np.isfinite(first)]
         assert len(first) > 0.9 * n
         check_proportion((first > 0).sum(), len(first), p / (1 - (1 - p) ** 2), 0, f"order {i}")
-
-
-def test_the_plan_warns_of_subtracted_bounds_that_end_inside():
-    """What is behind them is no wall that a ray could be sure of. Not where the operand is certainly absent at its bounds, or
-    nothing else is there."""
-    ball = gn.GaussianProcess(gn.SphereField([0, 0, 0], 0.8), 0.05, gn.SquaredExponential(0.2), bounds=((-1.2,) * 3, (1.2,) * 3))
-
-    def subtracted(mean, side):
-        return gn.GaussianProcess(mean, 0.05, gn.SquaredExponential(0.2), bounds=((-side,) * 3, (side,) * 3))
-
-    small = gn.SphereField([0, 0, 0], 0.2)
-    for other, expected in ((subtracted(-0.1, 0.5), True), (subtracted(small, 0.5), False), (subtracted(-0.1, 1.3), False)):
-        plan = gn.difference(ball, other).plan()
-        assert ("leaf[1].warning_bounds" in plan) == expected
-        if expected:
-            assert "depends on the order of the operands" in plan["leaf[1].warning_bounds"]
