@@ -139,7 +139,15 @@ struct Box3 {
   Vec3 min{kInfinity, kInfinity, kInfinity};
   Vec3 max{-kInfinity, -kInfinity, -kInfinity};
 
+  static constexpr Box3 everywhere() {
+    return {{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
+  }
   bool empty() const { return !(min.x <= max.x && min.y <= max.y && min.z <= max.z); }
+  bool contains(const Vec3& p) const {
+    for (int i = 0; i < 3; ++i)
+      if (p[i] < min[i] || p[i] > max[i]) return false;
+    return true;
+  }
   void include(const Vec3& p) {
     for (int i = 0; i < 3; ++i) {
       min[i] = std::min(min[i], p[i]);

@@ -6,15 +6,6 @@
 #include "process/plan.h"
 
 namespace gpis {
-namespace {
-
-bool contains(const Box3& box, const Vec3& x) {
-  for (int i = 0; i < 3; ++i)
-    if (x[i] < box.min[i] || x[i] > box.max[i]) return false;
-  return true;
-}
-
-}  // namespace
 
 HitGradient::HitGradient(const TreeSurface& surface, std::span<Line> lines, const TreeHit& hit,
                          std::span<const std::optional<State>> states, Rng& rng, Counters& counters)
@@ -60,7 +51,7 @@ void HitGradient::blend(std::span<Line> lines, const TreeHit& hit,
     const LineGeometry& line = lines[k].impl().geometry;
     const Vec3 at = line.origin + line.direction * hit.t;
     double f = kInfinity;
-    if (k == static_cast<std::size_t>(leaf_) || contains(plan.bounds, at))
+    if (k == static_cast<std::size_t>(leaf_) || plan.bounds.contains(at))
       f = leaves[k].sampled_at(lines[k], hit.t) ? leaves[k].value(lines[k], hit.t, rng)
           : plan.process->mean->value(at) < 0   ? -kInfinity
                                                 : kInfinity;

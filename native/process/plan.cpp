@@ -23,10 +23,6 @@ namespace {
 constexpr double kMostSteps = 1 << 20;
 constexpr double kTooManySteps = 1e6;
 
-Box3 everywhere() {
-  return {{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
-}
-
 Box3 intersection(const Box3& a, const Box3& b) {
   Box3 r;
   for (int i = 0; i < 3; ++i) {
@@ -62,7 +58,7 @@ std::shared_ptr<const GaussianProcess> normalised(const GaussianProcess& process
     out->mean = constant_if_it_is(process.mean);
   }
   if (const auto support = process.mean->support(); support && out->mean != process.mean)
-    out->bounds = intersection(process.bounds.value_or(everywhere()), *support);
+    out->bounds = intersection(process.bounds.value_or(Box3::everywhere()), *support);
   const bool tensors = process.anisotropy && !process.conditions;
   if (const auto a = tensors ? process.anisotropy->constant() : std::nullopt) {
     const Covariance refuses_what_takes_no_lengths(process);
@@ -242,7 +238,7 @@ PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Memory mem
 
   // Where a grid ends its field is a constant, and a jump there would be a surface of its own: no
   // surface outside.
-  plan.bounds = process->bounds.value_or(everywhere());
+  plan.bounds = process->bounds.value_or(Box3::everywhere());
   if (const auto support = process->mean->support())
     plan.bounds = intersection(plan.bounds, *support);
   if (plan.bounds.empty())

@@ -20,10 +20,6 @@ constexpr int kProbes = 6;  // blocks whose truncation is measured
 // deviations of what is left from what the others say, contradict them.
 constexpr double kDetermined = 1e-6, kContradiction = 30;
 
-Box3 everywhere() {
-  return {{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
-}
-
 }  // namespace
 
 Posterior::Posterior(const GaussianProcess& process)
@@ -33,7 +29,7 @@ Posterior::Posterior(const GaussianProcess& process)
   if (!std::isfinite(shortest_)) shortest_ = 1;
   std::vector<int> all(conditions_.points());
   std::iota(all.begin(), all.end(), 0);
-  divide(everywhere(), std::move(all));
+  divide(Box3::everywhere(), std::move(all));
 
   blocks_.resize(boxes_.size());
   tbb::parallel_for(std::size_t{0}, blocks_.size(), [&](std::size_t i) {

@@ -57,7 +57,7 @@ ProcessSurface::ProcessSurface(std::shared_ptr<const GaussianProcess> process,
   if (std::isfinite(length(box.max - box.min))) {
     world_bounds_ = image_of(box, object_to_world);
   } else {
-    world_bounds_ = {{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
+    world_bounds_ = Box3::everywhere();
   }
 }
 

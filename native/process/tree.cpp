@@ -114,18 +114,20 @@ TreePtr ProcessTree::complement(const ProcessTree& of) {
   return tree;
 }
 
-TreePtr ProcessTree::cut(const std::vector<ProcessPtr>& boxes) const {
+TreePtr ProcessTree::with_walls(const std::vector<Wall>& walls) const {
   auto tree = std::make_shared<ProcessTree>(*this);
+  for (std::size_t k = 0; k < walls.size(); ++k)
+    if (walls[k].operand) tree->leaves_[k].process = walls[k].operand;
   tree->nodes_.clear();
   std::vector<int> moved;  // where a node is now
   for (Node node : nodes_) {
     for (int& child : node.children) child = moved[child];
     tree->nodes_.push_back(node);
-    if (node.kind == Kind::leaf && boxes[node.leaf]) {
+    if (node.kind == Kind::leaf && walls[node.leaf].box) {
       // The box comes first: nothing is drawn of the leaf where it decides.
       const int leaf = tree->root(), box = leaf + 1;
       Leaf certain = leaves_[node.leaf];
-      certain.process = boxes[node.leaf];
+      certain.process = walls[node.leaf].box;
       certain.noise = tree->noises_++;
       Node both{certain.sign > 0 ? Kind::greatest : Kind::least, -1, node.noise, {box, leaf}};
       node.leaf = static_cast<int>(tree->leaves_.size());

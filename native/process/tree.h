@@ -45,9 +45,12 @@ class ProcessTree {
                          const std::string& name, double blend = 0);
   static TreePtr complement(const ProcessTree& tree);
 
-  // Leaf k cut by boxes[k] where that is not null: certain processes, which become leaves behind
-  // all others.
-  TreePtr cut(const std::vector<ProcessPtr>& boxes) const;
+  // The same tree of other operands, cut by their walls (walls.h), which become leaves behind all
+  // others; null: as it was, none.
+  struct Wall {
+    ProcessPtr operand, box;
+  };
+  TreePtr with_walls(const std::vector<Wall>& walls) const;
 
   // The same tree of other processes; one object that is several leaves stays one.
   template <class Change>

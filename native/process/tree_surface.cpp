@@ -10,15 +10,13 @@
 namespace gpis {
 namespace {
 
-constexpr Box3 kEverywhere{{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
-
 Box3 box_of(const ProcessTree& tree, int node, const std::vector<ProcessSurface>& leaves) {
   const ProcessTree::Node& n = tree.nodes()[node];
   // Outside of its bounds a leaf is absent: its complement is everywhere.
   if (n.kind == ProcessTree::Kind::leaf)
-    return tree.leaves()[n.leaf].sign > 0 ? leaves[n.leaf].bounds() : kEverywhere;
+    return tree.leaves()[n.leaf].sign > 0 ? leaves[n.leaf].bounds() : Box3::everywhere();
   const bool all = n.kind == ProcessTree::Kind::least;
-  Box3 box = all ? Box3{} : kEverywhere;
+  Box3 box = all ? Box3{} : Box3::everywhere();
   for (const int child : n.children) {
     const Box3 b = box_of(tree, child, leaves);
     for (int i = 0; i < 3; ++i) {
@@ -70,12 +68,20 @@ TreeSurface::TreeSurface(TreePtr tree, const Affine& object_to_world, Memory mem
 
 void TreeSurface::add_walls(const Affine& object_to_world, Memory memory, Sampler sampler,
                             double missed_root) {
-  const auto boxes = walls(*tree_, leaves_);
-  tree_ = tree_->cut(boxes);
-  for (std::size_t k = leaves_.size(); k < tree_->leaves().size(); ++k)
-    leaves_.emplace_back(tree_->leaves()[k].process, object_to_world, memory, sampler, missed_root);
-  for (std::size_t i = 0; i < boxes.size(); ++i)
-    if (boxes[i]) walled_.push_back(static_cast<int>(i));
+  const std::vector<ProcessTree::Wall> of_leaf = walls(*tree_, leaves_);
+  const auto plan = [&](const ProcessTree::ProcessPtr& process) {
+    return ProcessSurface(process, object_to_world, memory, sampler, missed_root);
+  };
+  bool any = false;
+  for (std::size_t k = 0; k < of_leaf.size(); ++k) {
+    const auto& [operand, box] = of_leaf[k];
+    any = any || operand;
+    if (operand) leaves_[k] = plan(operand);
+    if (!box) continue;
+    walled_.push_back(static_cast<int>(k));
+    leaves_.push_back(plan(box));
+  }
+  if (any) tree_ = tree_->with_walls(of_leaf);
 }
 
 void TreeSurface::serve_inside() {

@@ -1,6 +1,6 @@
 #include "process/walls.h"
 
-#include <map>
+#include <algorithm>
 
 #include "field/box_field.h"
 #include "field/constant_field.h"
@@ -10,83 +10,174 @@
 namespace gpis {
 namespace {
 
-// Of its size, how far a wall is within the bounds: the operand is still there where a ray meets
-// it.
-constexpr double kWithin = 1e-7;
+// Of the size of the bounds: a wall lies this far behind them and the operand goes on as far again,
+// so that it is there where a ray meets the wall, and others whose bounds end at the same place end
+// first. Bounds that are those of a grid cannot go on: there the wall lies this far before them.
+constexpr double kMargin = 1e-7;
 
-// Of leaf k times its sign, 0 where it is not certain.
-int sign_at(const ProcessTree& tree, const std::vector<ProcessSurface>& leaves, int k,
-            const Vec3& p) {
-  const PlannedLine& plan = leaves[k].planned();
-  const int positive = tree.leaves()[k].sign > 0 ? 1 : -1;
-  for (int i = 0; i < 3; ++i)
-    if (p[i] < plan.bounds.min[i] || p[i] > plan.bounds.max[i]) return positive;
-  if (plan.process->conditions) return 0;
-  const double clear = plan.skip_threshold + tree.leaves()[k].lift;
-  const double mean = plan.process->mean->value(p);
-  return mean > clear ? positive : mean < -clear ? -positive : 0;
-}
+// A rectangle across an axis: its centre and half its sides.
+struct Patch {
+  Vec3 center, half;
+};
 
-// Whether the body may end, or begin, with the leaf's bounds: the leaf may be solid at p before
-// their end, and behind it, at q, it matters that the leaf is absent.
-bool ends_inside(const ProcessTree& tree, const std::vector<ProcessSurface>& leaves, int leaf,
-                 const Vec3& p, const Vec3& q) {
-  const int absent = tree.leaves()[leaf].sign > 0 ? 1 : -1;
-  if (sign_at(tree, leaves, leaf, p) == absent) return false;
-  const auto given = [&](int of_leaf) {
-    return tree.sign(tree.root(),
-                     [&](int k) { return k == leaf ? of_leaf : sign_at(tree, leaves, k, q); });
-  };
-  return given(absent) != -absent && given(-absent) != absent;
-}
+class Walls {
+ public:
+  Walls(const ProcessTree& tree, const std::vector<ProcessSurface>& leaves)
+      : tree_(tree), leaves_(leaves) {}
 
-// Looked at on a lattice on the faces.
-bool ends_inside(const ProcessTree& tree, const std::vector<ProcessSurface>& leaves, int leaf) {
-  constexpr int kPoints = 16;
-  const Box3& box = leaves[leaf].planned().bounds;
-  if (!std::isfinite(length(box.max - box.min))) return false;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double behind = kWithin * (box.max[axis] - box.min[axis]);
-    for (const double side : {box.min[axis], box.max[axis]})
-      for (int i = 0; i < kPoints * kPoints; ++i) {
-        const double u = (i % kPoints + 0.5) / kPoints, v = (i / kPoints + 0.5) / kPoints;
-        const int j = (axis + 1) % 3, k = (axis + 2) % 3;
-        Vec3 p;
-        p[axis] = side;
-        p[j] = box.min[j] + u * (box.max[j] - box.min[j]);
-        p[k] = box.min[k] + v * (box.max[k] - box.min[k]);
-        Vec3 q = p;
-        q[axis] += side > box.min[axis] ? behind : -behind;
-        if (ends_inside(tree, leaves, leaf, p, q)) return true;
-      }
+  // The faces of the leaf's bounds that are walls, by bits 2 axis + upper.
+  unsigned faces(int leaf) const {
+    const PlannedLine& plan = leaves_[leaf].planned();
+    if ((tree_.leaves()[leaf].sign > 0 && !certain(leaf)) ||
+        !std::isfinite(length(plan.bounds.max - plan.bounds.min)))
+      return 0;
+    unsigned bits = 0;
+    for (int face = 0; face < 6; ++face)
+      if (is_wall(leaf, face)) bits |= 1u << face;
+    return bits;
   }
-  return false;
+
+  bool certain(int leaf) const { return leaves_[leaf].planned().sigma_max == 0; }
+
+ private:
+  // The most patches of a face that are looked at, and how often it is halved at most where nothing
+  // is known of the slopes of a mean.
+  static constexpr int kMostPatches = 4096, kDepthByPoints = 4, kMostDepth = 48;
+
+  // Of leaf k times its sign on all of a patch, 0 where it is not certain.
+  int sign(int k, const Patch& x) const {
+    const PlannedLine& plan = leaves_[k].planned();
+    const int positive = tree_.leaves()[k].sign > 0 ? 1 : -1;
+    bool within = true;
+    for (int i = 0; i < 3; ++i) {
+      const double low = x.center[i] - x.half[i], high = x.center[i] + x.half[i];
+      if (high < plan.bounds.min[i] || low > plan.bounds.max[i]) return positive;
+      within = within && low >= plan.bounds.min[i] && high <= plan.bounds.max[i];
+    }
+    if (plan.process->conditions) return 0;
+    const double clear = plan.skip_threshold + tree_.leaves()[k].lift + reach(plan, x);
+    const double mean = plan.process->mean->value(x.center);
+    return mean > clear ? positive : mean < -clear && within ? -positive : 0;
+  }
+
+  static double reach(const PlannedLine& plan, const Patch& x) {
+    const double r = length(x.half);
+    return r > 0 ? plan.mean_lipschitz * r : 0;
+  }
+
+  bool may_be_solid(int leaf, const Patch& x) const {
+    const PlannedLine& plan = leaves_[leaf].planned();
+    const double mean = plan.process->mean->value(x.center) - reach(plan, x);
+    // The face of a certain process may itself lie on its bounds.
+    return certain(leaf) ? mean < -4 * kMargin * length(plan.bounds.max - plan.bounds.min)
+                         : sign(leaf, x) != (tree_.leaves()[leaf].sign > 0 ? 1 : -1);
+  }
+
+  // Whether F may depend on the leaf on the patch.
+  bool matters(int leaf, const Patch& x) const {
+    const auto given = [&](int of_leaf) {
+      return tree_.sign(tree_.root(), [&](int k) { return k == leaf ? of_leaf : sign(k, x); });
+    };
+    return given(-1) != 1 && given(1) != -1;
+  }
+
+  // Whether the body may end, or begin, with the leaf's bounds: before their end the leaf may be
+  // solid and matters, and behind it as well.
+  bool may_end(int leaf, Patch x, int axis, double out) const {
+    const Box3& bounds = leaves_[leaf].planned().bounds;
+    const double step = out * kMargin * (bounds.max[axis] - bounds.min[axis]);
+    x.center[axis] -= step;
+    if (!may_be_solid(leaf, x) || !matters(leaf, x)) return false;
+    x.center[axis] += 2 * step;
+    return matters(leaf, x);
+  }
+
+  // Patches on which it may end are halved until it does so at the centre of one.
+  bool is_wall(int leaf, int face) const {
+    const int axis = face / 2, j = (axis + 1) % 3, k = (axis + 2) % 3;
+    const Box3& bounds = leaves_[leaf].planned().bounds;
+    const double out = face % 2 ? 1 : -1;
+    bool slopes = true;
+    for (const ProcessSurface& l : leaves_)
+      slopes = slopes && std::isfinite(l.planned().mean_lipschitz);
+    std::vector<std::pair<Patch, int>> open(1);
+    Patch& whole = open[0].first;
+    whole.center = (bounds.min + bounds.max) / 2;
+    whole.center[axis] = face % 2 ? bounds.max[axis] : bounds.min[axis];
+    whole.half = (bounds.max - bounds.min) / 2;
+    whole.half[axis] = 0;
+    // In the order of their size.
+    for (std::size_t next = 0; next < open.size() && next < kMostPatches; ++next) {
+      const auto [patch, depth] = open[next];
+      if (slopes && !may_end(leaf, patch, axis, out)) continue;
+      if (may_end(leaf, {patch.center, {}}, axis, out)) return true;
+      if (depth == (slopes ? kMostDepth : kDepthByPoints)) continue;
+      for (const double u : {-0.5, 0.5})
+        for (const double v : {-0.5, 0.5}) {
+          Patch part{patch.center, patch.half / 2};
+          part.center[j] += u * patch.half[j];
+          part.center[k] += v * patch.half[k];
+          open.emplace_back(part, depth + 1);
+        }
+    }
+    return false;
+  }
+
+  const ProcessTree& tree_;
+  const std::vector<ProcessSurface>& leaves_;
+};
+
+ProcessTree::Wall wall(const ProcessTree::Leaf& leaf, const Box3& bounds, bool certain,
+                       unsigned faces) {
+  const Vec3 size = bounds.max - bounds.min;
+  // Where a face is no wall the box goes on: nothing but the operand's bounds end it there.
+  Box3 inner = bounds, outer = bounds, own = leaf.process->bounds.value_or(Box3::everywhere());
+  for (int face = 0; face < 6; ++face) {
+    const int axis = face / 2;
+    const auto end = [&](auto& box) -> auto& {
+      return (face % 2 ? box.max : box.min)[axis];
+    };
+    const double margin = (face % 2 ? kMargin : -kMargin) * size[axis];
+    const bool is_wall = faces >> face & 1;
+    const bool goes_on = end(own) == (face % 2 ? bounds.max : bounds.min)[axis];
+    if ((is_wall || certain) && goes_on)
+      end(outer) += 2 * margin + (face % 2 ? leaf.lift : -leaf.lift);
+    end(inner) += is_wall ? (goes_on ? margin : -margin) : margin / kMargin;
+  }
+  ProcessTree::Wall out;
+  GaussianProcess wider = *leaf.process;
+  wider.bounds = outer;
+  out.operand = std::make_shared<const GaussianProcess>(std::move(wider));
+  if (faces == 0) return out;
+  GaussianProcess box;
+  box.mean = std::make_shared<BoxField>((inner.min + inner.max) / 2, inner.max - inner.min);
+  box.sigma = std::make_shared<ConstantField>(0);
+  // It correlates nothing, but tells the march what is small here.
+  box.kernel = std::make_shared<SquaredExponential>(std::min({size.x, size.y, size.z}));
+  out.box = std::make_shared<const GaussianProcess>(std::move(box));
+  return out;
 }
 
 }  // namespace
 
-std::vector<ProcessTree::ProcessPtr> walls(const ProcessTree& tree,
-                                           const std::vector<ProcessSurface>& leaves) {
-  std::vector<ProcessTree::ProcessPtr> boxes(leaves.size());
-  std::map<const GaussianProcess*, ProcessTree::ProcessPtr> of_process;
-  for (int k = 0; k < static_cast<int>(leaves.size()); ++k) {
+std::vector<ProcessTree::Wall> walls(const ProcessTree& tree,
+                                     const std::vector<ProcessSurface>& leaves) {
+  const Walls all(tree, leaves);
+  std::vector<ProcessTree::Wall> out(leaves.size());
+  std::vector<unsigned> faces(leaves.size());
+  for (std::size_t k = 0; k < leaves.size(); ++k) {
     const ProcessTree::Leaf& leaf = tree.leaves()[k];
-    const bool certain = leaves[k].planned().sigma_max == 0;
-    if ((leaf.sign > 0 && !certain) || !ends_inside(tree, leaves, k)) continue;
-    ProcessTree::ProcessPtr& box = of_process[leaf.process.get()];
-    if (!box) {
-      const Box3& bounds = leaves[k].planned().bounds;
-      GaussianProcess certain;
-      certain.mean = std::make_shared<BoxField>((bounds.min + bounds.max) / 2,
-                                                (bounds.max - bounds.min) * (1 - kWithin));
-      certain.sigma = std::make_shared<ConstantField>(0);
-      // It correlates nothing, but tells the march what is small here.
-      certain.kernel = std::make_shared<SquaredExponential>(length(bounds.max - bounds.min));
-      box = std::make_shared<const GaussianProcess>(std::move(certain));
-    }
-    boxes[k] = box;
+    const bool certain = all.certain(static_cast<int>(k)) && leaf.process->bounds;
+    faces[k] = all.faces(static_cast<int>(k));
+    if (faces[k] == 0 && !certain) continue;
+    // An object that is several leaves stays one.
+    for (std::size_t i = 0; i < k && !out[k].operand; ++i)
+      if (out[i].operand && faces[i] == faces[k] && tree.leaves()[i].process == leaf.process &&
+          tree.leaves()[i].lift == leaf.lift)
+        out[k] = out[i];
+    if (!out[k].operand) out[k] = wall(leaf, leaves[k].planned().bounds, certain, faces[k]);
   }
-  return boxes;
+  return out;
 }
 
 }  // namespace gpis

@@ -12,9 +12,10 @@
 
 namespace gpis {
 
-// For each leaf the box that ends it, null where it needs none. `leaves`: those of the tree,
-// planned.
-std::vector<ProcessTree::ProcessPtr> walls(const ProcessTree& tree,
-                                           const std::vector<ProcessSurface>& leaves);
+// For each leaf; `leaves`: those of the tree, planned. Where a leaf is blended it goes on behind
+// its walls as far as that reaches; bounds of a certain one move out a little, so that a face of it
+// that lies on them is seen.
+std::vector<ProcessTree::Wall> walls(const ProcessTree& tree,
+                                     const std::vector<ProcessSurface>& leaves);
 
 }  // namespace gpis

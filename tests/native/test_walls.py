@@ -9,7 +9,7 @@ from statistics_checks import check_proportion, check_same_distribution, check_z
 pytestmark = pytest.mark.stats
 
 END = 0.2  # of the hole, in x
-HOLE = ((-1.5, -1, -1), (END, 1, 1))
+HOLE = ((-1.5, -1.2, -1.2), (END, 1.2, 1.2))
 WIDE = ((-2.5, -2, -2), (2.5, 2, 2))
 BOX = ((-1, -1, -1), (1, 1, 1))
 KERNEL = gn.SquaredExponential(0.4)
@@ -64,7 +64,7 @@ def all_ways(n, seed):
 
 
 def on_end(hits):
-    return np.abs(hits["position"][:, 0] - END) < 1e-6
+    return np.abs(hits["position"][:, 0] - END) < 2e-7
 
 
 def check_same_hits(first, second, what):
@@ -92,8 +92,9 @@ def test_first_hits_are_those_of_a_box(body, subtracted, order, n, seed):
         check_same_hits(expected, hits, f"{body} less {subtracted}, {order}, rays {k}")
         p = on_end(expected).mean()
         check_proportion(on_end(hits).sum(), n, p, np.sqrt(p * (1 - p) / n), f"{body} less {subtracted}, {order}: end")
-        assert np.all(hits["part"][on_end(hits)] == FIRST[order])
-        assert np.allclose(hits["gradient"][on_end(hits)], [-1, 0, 0], atol=1e-9)
+        assert np.sum(hits["part"][on_end(hits)] != FIRST[order]) <= 2  # the body's own surface may be there by chance
+        faces = hits["gradient"][on_end(hits) & (hits["part"] == FIRST[order])]
+        assert np.allclose(faces, [-1, 0, 0], atol=1e-9)
         assert hits["counters"]["line_slope_floor"] == 0
         if k == 0 and body != "cloud":
             assert p > 0.2  # there is an end to see
@@ -227,6 +228,56 @@ def test_white_furnace(order, seed):
     for material in ("white", "glass"):
         mean, _ = render(tree, [material, material], seed)
         assert mean == pytest.approx(1, abs=1e-6 if material == "glass" else 2e-2)
+
+
+DEEP = -0.6  # six deviations: solid for certain
+
+
+def deep(bounds):
+    return gn.GaussianProcess(DEEP, 0.1, KERNEL, bounds=bounds)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_no_film_where_bounds_end_together(order):
+    """Where the other's bounds end on those of the hole there is nothing to see, on the whole of a face or a part of it; where
+    it goes on there is the hole's end."""
+    n = 200
+
+    def hits(body, hole, origin, direction):
+        tree = ORDERS[order](body, hole)
+        return gn.first_hits(tree, np.tile(np.array(origin, float), (n, 1)), np.tile(np.array(direction, float), (n, 1)), 12)
+
+    flush = deep(((-1, -1, -1), (END, 1, 1)))
+    assert not np.isfinite(hits(deep(BOX), flush, (-0.5, 3, 0.2), (0, -1, 0))["t"]).any()
+    end = hits(deep(BOX), flush, (-3, 0.1, 0.2), (1, 0, 0))
+    assert np.allclose(end["position"][:, 0], END, atol=1e-6)
+    # The body is two boxes, of which one ends where the hole does and one goes on.
+    body = gn.union(deep(((-1, -1, -1), (END, 0, 1))), deep(((-1, 0, -1), (1, 1, 1))))
+    hole = deep(((-1.5, -0.5, -0.5), (END, 0.5, 0.5)))
+    assert not np.isfinite(hits(body, hole, (-3, -0.2, 0.1), (1, 0, 0))["t"]).any()
+    assert np.allclose(hits(body, hole, (-3, 0.2, 0.1), (1, 0, 0))["position"][:, 0], END, atol=1e-6)
+
+
+@pytest.mark.parametrize("wide", [2.0, 50.0, 1e3, 1e6])
+def test_the_end_is_found_in_wide_bounds(wide):
+    """A ball of 1 on a face of any size."""
+    origins, directions = along_x(500)
+    hole = gn.GaussianProcess(-0.1, 0.2, KERNEL, bounds=((-1.5, -wide, -0.7 * wide), (END, 0.3 * wide + 1.5, 2 * wide)))
+    hits = gn.first_hits(gn.difference(BODIES["ball"], hole), origins, directions, 12)
+    assert np.isfinite(hits["t"]).all() and 0.2 < on_end(hits).mean() < 0.6
+
+
+def test_a_certain_face_on_its_bounds_is_seen(n, seed):
+    """Whatever rounding says, and still by a cut."""
+    ball, sides = gn.GaussianProcess(BALL, 0.1, KERNEL), ((-0.5, -0.3, -0.3), (0.3, 0.3, 0.3))
+    low, high = np.asarray(sides)
+    tight = gn.GaussianProcess(gn.BoxField((low + high) / 2, high - low), 0, KERNEL, bounds=sides)
+    rays = all_ways(n, seed)
+    alone, free = (gn.first_hits(gp, *rays, 12) for gp in (tight, box(sides)))
+    assert np.array_equal(np.isfinite(alone["t"]), np.isfinite(free["t"])) and "wall" not in tight.plan()
+    assert "cut by certain operands" in gn.difference(ball, tight).plan()["composition"]
+    cut, whole = (gn.first_hits(gn.intersection(ball, c), *rays, 12, seed=seed) for c in (tight, box(sides)))
+    check_same_hits(whole, cut, "within a box")
 
 
 def test_only_where_bounds_end_inside():
