@@ -1,6 +1,7 @@
 #include "process/condition_rows.h"
 
 #include <algorithm>
+#include <array>
 #include <numeric>
 
 #include "core/symmetric_eigen.h"
@@ -11,6 +12,26 @@ namespace gpis {
 namespace {
 
 constexpr int kLeafPoints = 8;
+
+// In directions in which g is constant the gradient is that of the mean.
+void check_gradient(const GaussianProcess& process, const Covariance& covariance, std::size_t i,
+                    const LocalPoint& at, const std::array<Functional, 3>& what, const Vec3& asked,
+                    const Vec3& of_mean) {
+  constexpr double kConstant = 1e-14, kSame = 1e-6;
+  const auto between = [&](int a, int b) { return covariance.between(at, what[a], at, what[b]); };
+  const SymmetricEigen3 eigen(
+      {between(0, 0), between(1, 1), between(2, 2), between(0, 1), between(0, 2), between(1, 2)});
+  for (int k = 0; k < 3; ++k) {
+    const Vec3& d = eigen.vectors[k];
+    if (eigen.values[k] > kConstant * eigen.values[2]) continue;
+    if (std::abs(dot(asked - of_mean, d)) <= kSame * (length(asked) + length(of_mean))) continue;
+    refuse("conditions.points[", i, "] at ", at.x, " asks for a slope of ", dot(asked, d),
+           " along ", d, ", where ", process.kernel->describe(), " is constant and the mean has ",
+           dot(of_mean, d),
+           ". Give a normal and a slope that agree with it there, or the kernel a finite length "
+           "scale.");
+  }
+}
 
 }  // namespace
 
@@ -41,11 +62,14 @@ ConditionRows::ConditionRows(const GaussianProcess& process, const Covariance& c
       rows_.push_back({at, {}, (*p.value - mean.value) / sigma.value, noise * noise, row});
     }
     // ∂_j f = ∂_j μ + g ∂_j σ + σ ∂_j g (math.md §2).
-    for (int j = 0; p.gradient && j < 3; ++j) {
-      Functional what{sigma.gradient[j] / sigma.value, {}};
-      what.slope[j] = 1;
-      rows_.push_back({at, what, ((*p.gradient)[j] - mean.gradient[j]) / sigma.value, 0, row});
+    if (!p.gradient) continue;
+    std::array<Functional, 3> what;
+    for (int j = 0; j < 3; ++j) {
+      what[j].value = sigma.gradient[j] / sigma.value;
+      what[j].slope[j] = 1;
+      rows_.push_back({at, what[j], ((*p.gradient)[j] - mean.gradient[j]) / sigma.value, 0, row});
     }
+    check_gradient(process, covariance, i, at, what, *p.gradient, mean.gradient);
   }
   first_row_.push_back(static_cast<int>(rows_.size()));
   order_.resize(points.size());

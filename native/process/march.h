@@ -151,8 +151,7 @@ class March {
   double stride_end(const Point& from, double b, double t_end) {
     const double far = cell_end(cell_ + 1), h = far - from.t;
     if (!(far <= std::min({from.t + smooth_step_, t_end, piece_end_}))) return b;
-    if (!(from.f > deviation_over(path_, from.t, h) * from.sigma && from.f + h / 3 * from.df > 0))
-      return b;
+    if (!(from.f > off_cubic(from.t, h) * from.sigma && from.f + h / 3 * from.df > 0)) return b;
     last_cell_ = cell_ + 1;
     path_.prepare(last_cell_, rng_, counters_);
     return far;
@@ -228,12 +227,15 @@ class March {
     return from.t + smooth_step_ >= whole && cross_pieces(from, whole, to);
   }
 
+  // How far g may differ from its cubic, in units of (B₁ + B₂).
+  double off_cubic(double a, double h) const { return plan_.caution * deviation_over(path_, a, h); }
+
   // The mean and the deviation by their steepest slopes, g by its cubic (see classify).
   bool certainly_clear(const Point& from, const Point& to) {
     const double h = to.t - from.t;
     const double mean = 0.5 * (from.mean + to.mean - mean_slope_ * h);
     const double g = std::min({from.g, to.g, from.g + h / 3 * from.dg, to.g - h / 3 * to.dg}) -
-                     deviation_over(path_, from.t, h);
+                     off_cubic(from.t, h);
     const double middle = 0.5 * (from.sigma + to.sigma), spread = 0.5 * sigma_slope_ * h;
     const double sigma = g < 0 ? middle + spread : std::max(0.0, middle - spread);
     if (!(mean + sigma * g > 0)) return false;
@@ -244,7 +246,7 @@ class March {
   // From `from` to the end of the cell g is the cubic through both, up to its deviation: a piece in
   // which f is positive for all that is crossed without asking the path.
   bool cross_pieces(Point& from, double whole, Point& to) {
-    const double deviation = deviation_over(path_, from.t, whole - from.t);
+    const double deviation = off_cubic(from.t, whole - from.t);
     const Cubic path(from.t, from.g, from.dg, whole, far_g_, far_dg_);
     double a = from.t, g = from.g, dg = from.dg;
     for (;;) {
@@ -321,8 +323,7 @@ class March {
     if (rises_through_rounding(a, b, step_)) return Verdict::none;
     const double h = b.t - a.t;
     const double sigma = std::max(a.sigma, b.sigma) + std::abs(b.dsigma - a.dsigma) * h;
-    return classify(a, b,
-                    deviation_over(path_, a.t, h) * sigma + mean_deviation_ * (h * h) * (h * h));
+    return classify(a, b, off_cubic(a.t, h) * sigma + mean_deviation_ * (h * h) * (h * h));
   }
 
   // `verdict` is that of the whole step: none is left to the caller.
@@ -356,8 +357,10 @@ class March {
   }
 
   void refine(const Point& lo, const Point& hi) {
-    const Point p = refine_root(lo, hi, resolution_ + 4e-16 * std::abs(hi.t),
-                                Path::kLastStep * step_, [&](double t) { return evaluate(t); });
+    Point p = refine_root(lo, hi, resolution_ + 4e-16 * std::abs(hi.t), Path::kLastStep * step_,
+                          [&](double t) { return evaluate(t); });
+    // By rounding, where a start leads into the surface.
+    p.t = std::max(p.t, 0.0);
     line_.hit_t = p.t;
     line_.hit_g = p.g;
     line_.hit_dg = p.dg;

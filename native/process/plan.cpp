@@ -258,6 +258,7 @@ PlannedLine plan_line(std::shared_ptr<const GaussianProcess> process, Memory mem
   const double span = std::isfinite(diagonal) ? diagonal : 1e4 * shortest;
   const double crossings = rate > 0 ? std::max(1.0, rate * span) : 1;
   plan.skip_deviations = std::sqrt(std::max(16.0, 2 * std::log(crossings / (kPi * missed_root))));
+  plan.caution = std::max(1.0, std::sqrt(std::log(missed_root) / std::log(1e-3)));
   plan.sigma_max = sigma.max;
   // Two to four cells of the path a length scale.
   plan.steps = std::isfinite(diagonal) ? 4 * lengths : 0;

@@ -15,7 +15,9 @@ struct PlannedLine {
   double skip_threshold =
       0;  // where the mean exceeds it, the surface is certainly absent (definitions B13)
   double skip_deviations = 0;  // the same in standard deviations
-  double condition_pull = 0;   // how far conditions may hold the mean of g from 0
+  // Paths are taken to be this much farther from their cubics than for a missed root in 1000 rays.
+  double caution = 1;
+  double condition_pull = 0;  // how far conditions may hold the mean of g from 0
   double smooth_scale = kInfinity;
   double mean_lipschitz = kInfinity, sigma_lipschitz = kInfinity;
   Box3 bounds;       // object space; outside there is no surface

@@ -99,10 +99,14 @@ TreePtr ProcessTree::combine(Kind kind, const std::vector<TreePtr>& parts, bool 
 
 void ProcessTree::check_one_kernel(const std::string& name) const {
   for (const Leaf& leaf : leaves_)
-    if (!same_noise(*leaves_[0].process, *leaf.process))
+    if (leaves_[0].process->time != leaf.process->time) {
+      refuse("", name,
+             " takes operands of one time and time_scale, since they see the same bumps.");
+    } else if (!same_noise(*leaves_[0].process, *leaf.process)) {
       refuse("", name, " takes operands of one kernel; these have ",
              leaves_[0].process->kernel->describe(), " and ", leaf.process->kernel->describe(),
              ".");
+    }
 }
 
 TreePtr ProcessTree::complement(const ProcessTree& of) {

@@ -279,7 +279,8 @@ double TreeLines::margin(int leaf, const LeafPoint& a, const LeafPoint& b) const
   const Leaf& l = leaves[leaf];
   const double h = b.t - a.t;
   const double sigma = std::max(a.sigma, b.sigma) + std::abs(b.dsigma - a.dsigma) * h;
-  return noises[l.noise].path->deviation(a.t, h) * sigma + l.mean_deviation * (h * h) * (h * h);
+  return l.plan->caution * noises[l.noise].path->deviation(a.t, h) * sigma +
+         l.mean_deviation * (h * h) * (h * h);
 }
 
 }  // namespace gpis

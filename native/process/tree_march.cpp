@@ -243,10 +243,10 @@ void TreeMarch::refine(int leaf, const LeafPoint& lo, const LeafPoint& hi) {
 }
 
 void TreeMarch::hit(int leaf, const LeafPoint& p) {
-  hit_.t = p.t;
+  hit_.t = std::max(p.t, 0.0);  // by rounding, where a start leads into the surface
   hit_.leaf = leaf;
   const Leaf& l = lines_.leaves[leaf];
-  l.line->hit_t = p.t;
+  l.line->hit_t = hit_.t;
   l.line->hit_g = p.g;
   l.line->hit_dg = p.dg;
   l.line->hit_mean = l.mean->sample(p.t);

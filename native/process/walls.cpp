@@ -28,7 +28,7 @@ class Walls {
   // The faces of the leaf's bounds that are walls, by bits 2 axis + upper.
   unsigned faces(int leaf) const {
     const PlannedLine& plan = leaves_[leaf].planned();
-    if ((tree_.leaves()[leaf].sign > 0 && !certain(leaf)) ||
+    if ((tree_.leaves()[leaf].sign > 0 && plan.process->sigma->range().min > 0) ||
         !std::isfinite(length(plan.bounds.max - plan.bounds.min)))
       return 0;
     unsigned bits = 0;
@@ -67,10 +67,13 @@ class Walls {
 
   bool may_be_solid(int leaf, const Patch& x) const {
     const PlannedLine& plan = leaves_[leaf].planned();
-    const double mean = plan.process->mean->value(x.center) - reach(plan, x);
+    const bool positive = tree_.leaves()[leaf].sign > 0;
+    if (!positive && !certain(leaf)) return sign(leaf, x) != -1;
+    // A random process that is not subtracted is entered outside, but for where its deviation is 0.
+    if (length(x.half) == 0 && plan.process->sigma->value(x.center) > 0) return false;
     // The face of a certain process may itself lie on its bounds.
-    return certain(leaf) ? mean < -4 * kMargin * length(plan.bounds.max - plan.bounds.min)
-                         : sign(leaf, x) != (tree_.leaves()[leaf].sign > 0 ? 1 : -1);
+    const double mean = plan.process->mean->value(x.center) - reach(plan, x);
+    return mean < -4 * kMargin * length(plan.bounds.max - plan.bounds.min);
   }
 
   // Whether F may depend on the leaf on the patch.

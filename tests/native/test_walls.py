@@ -154,6 +154,20 @@ def test_a_certain_body_is_cut_by_its_bounds(n, seed):
     assert gn.first_hits(alone, *rays, 12)["state"]["value"].shape == (n,)
 
 
+def test_a_body_whose_deviation_is_0_at_the_cut(n, seed):
+    """On a grid, and elsewhere it is not: a random body is entered outside, there it cannot be."""
+    at = np.linspace(-1.5, 1.5, 31)
+    values = np.full((31, 31, 31), 0.1)
+    values[at < 0] = 0
+    sigma = gn.GridField(values, (0.1,) * 3, (-1.5,) * 3)
+    body = gn.GaussianProcess(BALL, sigma, KERNEL, bounds=((-0.4, -1.2, -1.2), (1.2, 1.2, 1.2)))
+    rays = np.tile([-3.0, 0.1, 0.1], (n, 1)), np.tile([1.0, 0, 0], (n, 1))
+    far = gn.GaussianProcess(gn.SphereField([30, 0, 0], 1), 0.1, KERNEL)
+    for tree in (body, gn.union(far, body), gn.difference(body, far)):
+        hits = gn.first_hits(tree, *rays, 12, seed=seed)
+        assert np.allclose(hits["position"][:, 0], -0.4, atol=1e-6)
+
+
 def test_the_end_of_a_hole_in_everything(n, seed):
     """A complement has no other operand that could be solid: it is itself."""
     room = gn.complement(gn.GaussianProcess(-0.5, 0.05, KERNEL, bounds=BOX))
