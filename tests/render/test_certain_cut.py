@@ -122,7 +122,11 @@ def test_light_is_that_of_the_march_together(name, memory, seed, full_size):
         cut, together = (r.stats for r in results)
         what = f"{name}, {memory}, {place}, {bounds}, {material}"
         assert cut["nan_samples"] == cut["states_inside"] == 0, what
-        assert cut["line_evaluations"] < together["line_evaluations"], what
+        # A certain operand that is subtracted in bounds of its own is no convex body.
+        if "cut by" in trees[0].plan()["composition"]:
+            assert cut["line_evaluations"] < together["line_evaluations"], what
+        else:
+            assert bounds == TIGHT and name.startswith("less"), what
         same_floor(cut, together, what)
         compare(*results, what, 7e-4 if cut["line_tabulated"] else 0)
 
