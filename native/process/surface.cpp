@@ -283,6 +283,12 @@ std::vector<std::pair<std::string, std::string>> ProcessSurface::plan() const {
                      " time scales: a realisation (memory global, gp.realisation) flows "
                      "from frame to frame under one seed; the other memories draw "
                      "every path anew, whose expectation does not change with time"});
+  if (const double error = planned_->line_sampler->correlation_error(); error > 0.01)
+    facts.emplace_back("warning_covariance",
+                       "Correlations along a ray may be off by " + number(error) +
+                           ": what this kernel does changes too fast for the sampler. Let "
+                           "lengths change more slowly, take a squared exponential, or the "
+                           "sampler 'realisation'.");
   if (planned_->line_sampler->reach() < kInfinity)
     facts.emplace_back(
         "line_reach", "A ray that meets no surface for more than " +

@@ -73,7 +73,8 @@ class Walls {
     if (length(x.half) == 0 && plan.process->sigma->value(x.center) > 0) return false;
     // The face of a certain process may itself lie on its bounds.
     const double mean = plan.process->mean->value(x.center) - reach(plan, x);
-    return mean < -4 * kMargin * length(plan.bounds.max - plan.bounds.min);
+    const double slope = std::min(1.0, plan.mean_lipschitz);
+    return mean < -4 * kMargin * slope * length(plan.bounds.max - plan.bounds.min);
   }
 
   // Whether F may depend on the leaf on the patch.

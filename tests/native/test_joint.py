@@ -74,6 +74,14 @@ def test_crease(kernel, full_size, seed):
     assert counters["line_evaluations"] < 80 * counters["line_segments"] and counters["line_splits"] > 0
 
 
+def test_a_sampler_that_is_wrong_says_so():
+    """Rough kernels at the same crease: a path between points of one spacing cannot follow it."""
+    field = along_x(lambda x: isotropic(0.1 if abs(x - 2) < 0.05 else 1.0), 8, 101)
+    for kernel, warned in ((gn.Matern(2.5, 1), True), (gn.SquaredExponential(1), False)):
+        plan = gn.GaussianProcess(5.0, 1.0, kernel, anisotropy=field, bounds=BOUNDS).plan()
+        assert ("warning_covariance" in plan) == warned == (float(plan["correlation_error"]) > 0.01)
+
+
 def test_dense_lines_of_smooth_kernels(full_size, seed):
     """Points so close, over so many length scales, that rounding once grew to a thousand deviations."""
     n, kernel = 10_000 if full_size else 600, gn.LocallyPeriodic(0.3, 0.5, [0, 0.6, 0.8], 0.9)
