@@ -332,35 +332,6 @@ def test_contradictions_are_refused_by_name():
     assert abs(noisy.posterior(points[:1])[0][0] - 0.05) < 0.01
 
 
-INFINITE = {
-    "height field": gn.SquaredExponential([0.3, 0.3, np.inf]),
-    "turned": gn.SquaredExponential([0.3, 0.3, np.inf], rotation=(0.8, 0.6, 0, 0)),
-    "plane wave": gn.PlaneWave([1, 0, 0]),
-    "constant": gn.SquaredExponential([np.inf] * 3),
-}
-
-
-@pytest.mark.parametrize("kernel", INFINITE)
-def test_slopes_where_nothing_varies_are_those_of_the_mean(kernel):
-    """Others are refused by name, which were left out before without a word; those that agree are kept."""
-    axis = np.array([0, -0.96, 0.28]) if kernel == "turned" else np.array([0, 0, 1.0])
-    mean = gn.PlaneField([0, 0, 0], axis)
-
-    def conditioned(normal, slope):
-        conditions = {"points": [[0, 0, 0.05]], "normals": [normal / np.linalg.norm(normal)], "slopes": [slope]}
-        return gn.GaussianProcess(mean, 0.1, INFINITE[kernel], bounds=((-1,) * 3, (1,) * 3), conditions=conditions)
-
-    across = np.array([0.3, 0, 0])
-    for normal, slope in ((-axis, 1.0), (axis, 2.0), (axis + across, 1.0)):
-        with pytest.raises(ValueError, match=r"conditions.points\[0\].*slope of .* is constant and the mean has"):
-            conditioned(normal, slope)
-    h = 1e-4
-    tilted = np.zeros(3) if kernel == "constant" else across  # of which no tilt is possible
-    gp = conditioned(axis + tilted, np.linalg.norm(axis + tilted))
-    at = gp.posterior(np.array([[0, 0, 0.05], [h, 0, 0.05], [0, 0, 0.05] + h * axis]))[0]
-    assert np.allclose((at[1:] - at[0]) / h, [tilted[0], 1], atol=1e-3)
-
-
 @pytest.mark.parametrize(
     "wrong, sentence",
     [
