@@ -5,6 +5,7 @@
 #include <array>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "core/sym_mat3.h"
 #include "field/field.h"
@@ -35,6 +36,8 @@ class TensorField {
   virtual Range eigenvalues(const Box3& box) const = 0;
   // The matrix that the field is everywhere, where it is known to be one.
   virtual std::optional<SymMat3> constant() const { return std::nullopt; }
+  // Places where lengths are shortest and where they change most, where any are known.
+  virtual std::vector<Vec3> extremes() const { return {}; }
   // On the line o + t d, ∂_d A may jump (at the faces of cells). A bound of the sum of
   // √(⅛ tr((A⁻¹ J)²)) over the jumps J between two t. A process with the covariance of Paciorek and
   // Schervish has slopes that jump with these deviations.

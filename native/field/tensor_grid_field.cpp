@@ -25,6 +25,8 @@ TensorGridField::TensorGridField(Bricks bricks, const Affine& index_to_object,
                                  const std::function<std::string(const Index3&)>& node_name)
     : bricks_(std::move(bricks)), object_to_index_(inverse(index_to_object)) {
   const Index3& n = bricks_[0]->nodes();
+  Index3 shortest{};
+  double least_yet = kInfinity;
   eigenvalues_ = eigenvalues_of_nodes(
       {0, 0, 0}, {n[0] - 1, n[1] - 1, n[2] - 1}, [&](const Index3& at, double least, double most) {
         if (!(least > 1e-12 * most))
@@ -32,8 +34,18 @@ TensorGridField::TensorGridField(Bricks bricks, const Affine& index_to_object,
                  most,
                  "); the anisotropy takes squared length scales, all of whose eigenvalues are "
                  "positive.");
+        if (least < least_yet) {
+          least_yet = least;
+          shortest = at;
+        }
       });
-  find_kinks();
+  const auto place = [&](const Index3& at) {
+    return index_to_object.point({double(at[0]), double(at[1]), double(at[2])});
+  };
+  if (const auto sharpest = find_kinks()) {
+    extremes_.push_back(place(shortest));
+    if (*sharpest != shortest) extremes_.push_back(place(*sharpest));
+  }
 }
 
 std::optional<SymMat3> TensorGridField::constant() const {
@@ -122,12 +134,19 @@ double TensorGridField::kink_at(int axis, const Index3& at) const {
       0.0, dot(m.row[0], mt.row[0]) + dot(m.row[1], mt.row[1]) + dot(m.row[2], mt.row[2])));
 }
 
-void TensorGridField::find_kinks() {
+std::optional<Index3> TensorGridField::find_kinks() {
+  Index3 sharpest{};
+  double most = 0;
   for (int axis = 0; axis < 3; ++axis)
-    kinks_[axis] =
-        std::make_shared<BrickGrid>(bricks_[0]->nodes(), [this, axis](int i, int j, int k) {
-          return static_cast<float>(kink_at(axis, {i, j, k}));
-        });
+    kinks_[axis] = std::make_shared<BrickGrid>(bricks_[0]->nodes(), [&, axis](int i, int j, int k) {
+      const double kink = kink_at(axis, {i, j, k});
+      if (kink > most) {
+        most = kink;
+        sharpest = {i, j, k};
+      }
+      return static_cast<float>(kink);
+    });
+  return most > 0 ? std::optional(sharpest) : std::nullopt;
 }
 
 SymMat3 TensorGridField::value(const Vec3& p) const {

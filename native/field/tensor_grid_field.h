@@ -26,6 +26,7 @@ class TensorGridField final : public TensorField {
   Range eigenvalues() const override { return eigenvalues_; }
   Range eigenvalues(const Box3& box) const override;
   std::optional<SymMat3> constant() const override;
+  std::vector<Vec3> extremes() const override { return extremes_; }
   double kinks(const Vec3& o, const Vec3& d, double t_begin, double t_end) const override;
 
  private:
@@ -44,11 +45,13 @@ class TensorGridField final : public TensorField {
   // eigenvalue of every one that widens the range.
   template <class Check>
   Range eigenvalues_of_nodes(const Index3& first, const Index3& last, const Check& check) const;
-  void find_kinks();
+  // Fills kinks_; the node with the largest, none without any.
+  std::optional<Index3> find_kinks();
 
   Bricks bricks_;
   Affine object_to_index_;
   Range eigenvalues_;
+  std::vector<Vec3> extremes_;
   // At every node, a bound c of the second difference D of A across it along each axis: -cA <= D <=
   // cA. The same holds between nodes with the largest c of them.
   std::array<std::shared_ptr<const BrickGrid>, 3> kinks_;

@@ -9,6 +9,7 @@ TransformedTensorField::TransformedTensorField(TensorFieldPtr field, const Affin
     : field_(std::move(field)), linear_(matrix.linear) {
   stretch_ = check_transform(matrix);
   inverse_ = inverse(matrix);
+  for (const Vec3& place : field_->extremes()) extremes_.push_back(matrix.point(place));
 }
 
 Range TransformedTensorField::eigenvalues(const Box3& box) const {

@@ -25,6 +25,7 @@ class TransformedTensorField final : public TensorField {
     const std::optional<SymMat3> a = field_->constant();
     return a ? std::optional(congruence(linear_, *a)) : std::nullopt;
   }
+  std::vector<Vec3> extremes() const override { return extremes_; }
   // J becomes M J Mᵀ as A does: A⁻¹J keeps its eigenvalues.
   double kinks(const Vec3& o, const Vec3& d, double t_begin, double t_end) const override {
     return field_->kinks(inverse_.point(o), inverse_.vector(d), t_begin, t_end);
@@ -40,6 +41,7 @@ class TransformedTensorField final : public TensorField {
   Mat3 linear_;
   Affine inverse_;
   Range stretch_;
+  std::vector<Vec3> extremes_;
 };
 
 }  // namespace gpis

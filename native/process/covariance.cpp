@@ -268,8 +268,10 @@ double Covariance::length_scale(const LocalPoint& x, const Vec3& d) const {
     }
     if (terms_.empty())
       inverse2 = dot(d, d) / (kernel_->min_length_scale() * kernel_->min_length_scale());
-    // Modulation, of which a length scale says nothing.
-    if (smooth_) inverse2 = std::max(inverse2, dot(d, derivative_covariance_ * d) / variance_);
+    // Modulation, of which a length scale says nothing. Matérn 3/2 has slopes of √3 per length.
+    if (differentiable_)
+      inverse2 =
+          std::max(inverse2, dot(d, derivative_covariance_ * d) / variance_ / (smooth_ ? 1 : 3));
   }
   return 1 / std::sqrt(inverse2);
 }

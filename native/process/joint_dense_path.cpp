@@ -1,10 +1,8 @@
 #include "process/joint_dense_path.h"
 
 #include <algorithm>
-#include <span>
 
 #include "process/march_sampler.h"
-#include "process/survey.h"
 
 namespace gpis {
 namespace {
@@ -15,11 +13,12 @@ namespace {
 // costs 1e-3 where it is stable). The correlation is off by this much, the path stays a cubic.
 constexpr double kJitter = 1e-6;
 
-// Of a line that is surveyed, each as a ray of its own.
-constexpr int kParts = 6;
-// What is found there is exceeded on lines of other directions, by 1.4 in
-// tests/native/test_implied_covariance.cpp.
-constexpr double kElsewhere = 2;
+// What is found on the lines surveyed may be exceeded on others: by 1.12 on the most unlike of
+// tests/native/test_implied_covariance.cpp, whose true errors are below half of what is found.
+constexpr double kElsewhere = 1.25;
+constexpr double kEnough = 8e-4, kClosest = 0.05;
+// Length scales of a line that forgets.
+constexpr double kFar = 40;
 
 // Through (a, da) at `begin` and (b, db) at `end`, in Bernstein's form.
 void cubic(double begin, double a, double da, double end, double b, double db, double t, double& g,
@@ -30,94 +29,65 @@ void cubic(double begin, double a, double da, double end, double b, double db, d
   dg = 3 * (r * r * (c1 - a) + 2 * r * s * (c2 - c1) + s * s * (b - c2)) / h;
 }
 
-// Of a cell, of which the rest is a cubic.
+// Of an interval, of which the rest is a cubic.
 constexpr int kHalvings = 8;
 
-// One of a sum of values and slopes of g.
-struct Part {
-  LocalPoint at;
-  Functional what;
-};
-
-double shared(const Covariance& covariance, std::span<const Part> a, std::span<const Part> b) {
-  double sum = 0;
-  for (const Part& p : a)
-    for (const Part& q : b) sum += covariance.between(p.at, p.what, q.at, q.what);
-  return sum;
-}
-
-// At a fraction s of [a, a + h]: what the cubic through both ends has there, less g.
-std::array<Part, 3> error_of_cubic(const Covariance& covariance, const LineGeometry& line, double a,
-                                   double h, double s) {
-  const double r = 1 - s;
-  const Vec3 d = line.direction;
-  const auto at = [&](double t) { return covariance.at(line.origin + d * t); };
-  return {Part{at(a), {r * r * (1 + 2 * s), d * (r * r * s * h)}}, Part{at(a + s * h), {-1, {}}},
-          Part{at(a + h), {s * s * (1 + 2 * r), d * (-s * s * r * h)}}};
-}
-
-// q of Var(g'(t + h) - g'(t)) = q h + O(h²), 0 of smoother paths. The cubic through values and
-// slopes h apart misses a variance of q h³/192 in the middle, and one of order h⁵ of what has a
-// second derivative: taken off by that of half the interval about the same place.
-double slope_intensity(const Covariance& covariance, const LineGeometry& line, double a, double h) {
-  const auto missed = [&](double begin, double length) {
-    const auto error = error_of_cubic(covariance, line, begin, length, 0.5);
-    return shared(covariance, error, error) / covariance.variance();
-  };
-  const double rough = (32 * missed(a + h / 4, h / 2) - missed(a, h)) / 3;
-  return std::max(0.0, 192 * rough / (h * h * h));
-}
-
-// |implied - exact correlation| of the cubics through values and slopes at points h apart from
-// within one cell to within another and to the points, at most.
-double error_of_cubics(const Covariance& covariance, const SurveyLine& survey, double t, double h) {
-  const LineGeometry& line = survey.geometry;
-  const auto error = [&](double a, double s) { return error_of_cubic(covariance, line, a, h, s); };
-  const auto value = [&](double s) {
-    return std::array<Part, 1>{Part{covariance.at(line.origin + line.direction * s), {}}};
-  };
-  const auto shared = [&](std::span<const Part> a, std::span<const Part> b) {
-    return gpis::shared(covariance, a, b);
-  };
-  double largest = 0;
-  for (const double s : {0.25, 0.5, 0.75}) {
-    const auto here = error(t, s);
-    for (int k = 0; k < 4; ++k) {
-      const double a = t + k * h;
-      if (a + h > survey.end) break;  // lengths may change at once where bounds end
-      largest = std::max(largest, std::abs(shared(here, value(a))));
-      for (const double u : {0.25, 0.5, 0.75}) {
-        const auto there = error(a, u);
-        largest =
-            std::max(largest, std::abs(shared(here, value(a + u * h)) +
-                                       shared(value(t + s * h), there) + shared(here, there)));
-      }
-    }
-  }
-  return largest / covariance.variance();
+// How far off its cubic, in units of (B₁ + B₂), a path between points may be, for 4.5 standard
+// deviations of a bridge: as DensePath's, (B₁+B₂)(½) = ¾, and 5 % for shorter intervals.
+double bridge_bound(double intensity, double h) {
+  return 4.5 * 1.05 / 0.75 * std::sqrt(intensity * h * h * h / 192);
 }
 
 }  // namespace
 
 JointDensePath::Plan::Plan(const GaussianProcess& process, const Box3& bounds)
-    : JointLine::Plan(process), spacing(covariance.smooth() ? 0.25 : 0.15) {
+    : JointLine::Plan(process),
+      spacing{covariance.smooth() ? 0.25 : 0.15, 0.04, 5e-4,
+              DensePoints::roughness_under(process)} {
+  const std::vector<SurveyLine> lines = survey_lines(covariance, bounds);
   // Closer points until the cubics are good enough for lengths that vary.
-  for (;; spacing *= 0.7) {
+  for (;; spacing.lengths *= 0.8, spacing.kinks *= 0.5, spacing.missed *= 0.5) {
     correlation_error = 0;
-    for (const SurveyLine& line : survey_lines(covariance, bounds))
-      // Points of a short ray lie farther apart: the shortest lengths of the line may be elsewhere.
-      for (int part = 0; part < kParts; ++part) {
-        const double begin = line.end * part / kParts, end = line.end * (part + 1) / kParts;
-        const double h = 2 * spacing * survey_step(covariance, line.geometry, begin, end);
-        if (!std::isfinite(h)) continue;
-        const int cells = static_cast<int>(std::min(std::ceil((end - begin) / h), 40.0));
-        for (int i = 0; i < cells; ++i)
-          correlation_error =
-              std::max(correlation_error, error_of_cubics(covariance, line, begin + i * h, h));
-      }
-    correlation_error *= kElsewhere;
-    if (correlation_error < 1e-3 || spacing < 0.05) break;
+    for (const SurveyLine& line : lines)
+      correlation_error = std::max(correlation_error, kElsewhere * error_on(*this, line));
+    if (correlation_error < kEnough || spacing.lengths < kClosest) break;
   }
+  double lost = 0;
+  for (const SurveyLine& line : survey_lines(covariance, bounds, kFar))
+    lost = std::max(lost, lost_on(*this, line));
+  correlation_error += kElsewhere * lost;
+}
+
+// Between cubics over one interval and over the same, the next and farther ones: what kinks do
+// shows from afar too.
+double JointDensePath::error_on(const Plan& plan, const SurveyLine& line) {
+  JointDensePath path;
+  Counters counters;
+  path.reset(plan, line.geometry, 0, line.end, counters);
+  if (std::isinf(path.step_)) return 0;
+  std::vector<DensePoints::Interval> intervals;
+  double largest = 0;
+  for (double t = 0; t < line.end; t = intervals.back().end) {
+    intervals.push_back({t, path.where_.after(t)});
+    for (const std::size_t back : {0, 1, 2, 3, 5, 8, 13, 21})
+      if (back < intervals.size())
+        largest = std::max(largest, path.where_.error_of_cubics(
+                                        intervals[intervals.size() - 1 - back], intervals.back()));
+    if (!path.rows_.has_line() && intervals.size() > 21) break;  // all are like these
+  }
+  return largest;
+}
+
+// The largest correlation that a line forgets.
+double JointDensePath::lost_on(const Plan& plan, const SurveyLine& line) {
+  JointDensePath path;
+  Rng rng(1, 0);
+  Counters counters;
+  double g, dg;
+  path.reset(plan, line.geometry, 0, line.end, counters);
+  path.start_free(rng, counters, g, dg);
+  while (std::isfinite(path.step_) && path.points_.back().t < line.end) path.extend(rng, counters);
+  return path.lost();
 }
 
 void JointDensePath::reset(const Plan& plan, const LineGeometry& line, double anchor, double t_end,
@@ -125,106 +95,164 @@ void JointDensePath::reset(const Plan& plan, const LineGeometry& line, double an
   begin(plan, line, anchor, counters);
   rests_.clear();
   counters_ = &counters;
-  step_ = 2 * plan.spacing * survey_step(*covariance_, line, anchor, t_end);
+  step_ = plan.spacing.lengths * near_length(t_end);
+  where_.reset(*covariance_, line_, rows_.has_line() ? &rows_.line() : nullptr, plan.spacing,
+               anchor, step_);
 }
 
 void JointDensePath::start_free(Rng& rng, Counters& counters, double& g, double& dg) {
   JointLine::start_free(rng, counters, g, dg);
-  points_.assign(1, {0, g, dg});
+  points_.assign(1, {anchor_, g, dg});
 }
 
 double JointDensePath::start(const PathStart& known, Rng& rng, Counters& counters) {
   const double slope = JointLine::start(known, rng, counters);
-  points_.assign(1, {0, known.value, slope});
+  points_.assign(1, {anchor_, known.value, slope});
   return slope;
 }
 
-void JointDensePath::draw(long index, Rng& rng, Counters& counters) {
-  if (points_.back().index >= index) return;
-  if (std::isinf(step_)) {  // constant along the line
-    points_.push_back({index, points_.back().g, points_.back().dg});
-    return;
+void JointDensePath::draw(double t, Rng& rng, Counters& counters) {
+  reach(t, counters);
+  LinePoint place;
+  LocalPoint p;
+  const LinePoint* on_line = nullptr;
+  if (rows_.has_line()) {
+    ++counters.tensor_lookups;
+    place = rows_.line().at(t);
+    on_line = &place;
+    p = alone() ? rows_.line().local(place) : point(t);
+  } else {
+    p = point(t);
   }
-  reach(anchor_ + index * step_, counters);
-  const LocalPoint p = point(anchor_ + index * step_);
-  counters.tensor_lookups += !covariance_->stationary();
-  const double g = rows_.add_free(p, value_row(), rng, counters, kJitter);
-  points_.push_back({index, g, rows_.add_free(p, slope_row(), rng, counters, kJitter)});
+  const double g = rows_.add_free(p, value_row(), rng, counters, kJitter, on_line);
+  points_.push_back({t, g, rows_.add_free(p, slope_row(), rng, counters, kJitter, on_line)});
+}
+
+void JointDensePath::extend(Rng& rng, Counters& counters) {
+  const double t = points_.back().t;
+  draw(where_.after(t), rng, counters);
+  points_[points_.size() - 2].intensity = where_.slope_intensity(t, points_.back().t);
 }
 
 void JointDensePath::prepare(long cell, Rng& rng, Counters& counters) {
-  draw(cell, rng, counters);
-  const std::size_t left = points_.size() - 1;
-  draw(cell + 1, rng, counters);
-  if (covariance_->smooth() || std::isinf(step_) || left + 1 == points_.size()) return;
-  points_[left].intensity =
-      slope_intensity(*covariance_, line_, anchor_ + points_[left].index * step_, step_);
+  if (std::isinf(step_)) return;  // constant along the line
+  // A stretch was skipped: goes on here, given all before it.
+  if (points_.back().t < cell_end(cell - 1)) draw(cell_end(cell - 1), rng, counters);
+  while (points_.back().t < cell_end(cell)) extend(rng, counters);
+  draw_rests(cell_end(cell), rng);
 }
 
-const JointDensePath::Point& JointDensePath::point_of(long cell) const {
+std::size_t JointDensePath::before(double t) const {
   std::size_t i = points_.size() - 1;
-  while (points_[i].index > cell) --i;
-  return points_[i];
+  while (i > 0 && points_[i].t > t) --i;
+  return i;
 }
 
-void JointDensePath::at_left(long cell, double& g, double& dg) const {
-  const Point& p = point_of(cell);
-  g = p.g;
-  dg = p.dg;
-}
-
-// As DensePath's: 4.5 standard deviations, (B₁+B₂)(½) = ¾, and 5 % for shorter intervals.
-double JointDensePath::deviation(double a, double h) const {
-  if (covariance_->smooth() || std::isinf(step_)) return 0;
-  const Point& p = point_of(static_cast<long>(std::floor((a - anchor_) / step_ + 1e-9)));
-  return 4.5 * 1.05 / 0.75 * std::sqrt(p.intensity * h * h * h / 192);
+std::array<JointDensePath::Rest, 2> JointDensePath::rests_around(std::size_t piece,
+                                                                 double t) const {
+  std::array<Rest, 2> around{Rest{points_[piece].t, 0, 0}, Rest{points_[piece + 1].t, 0, 0}};
+  const auto right = std::upper_bound(rests_.begin(), rests_.end(), t,
+                                      [](double x, const Rest& rest) { return x < rest.t; });
+  if (right != rests_.begin() && (right - 1)->t > around[0].t) around[0] = *(right - 1);
+  if (right != rests_.end() && right->t < around[1].t) around[1] = *right;
+  return around;
 }
 
 // An integrated Brownian motion given value and slope at both ends of an interval: the value of its
 // middle has the variance q h³/192, the slope there q h/16, and neither knows of the other.
-void JointDensePath::add_rest(long cell, double t, Rng& rng, double& g, double& dg) {
-  const double intensity = point_of(cell).intensity;
-  if (!(intensity > 0)) return;
-  const double begin = anchor_ + cell * step_;
-  Rest a{begin, 0, 0}, b{begin + step_, 0, 0};
-  if (!(t > a.t && t < b.t)) return;
-  auto right = std::upper_bound(rests_.begin(), rests_.end(), t,
-                                [](double x, const Rest& rest) { return x < rest.t; });
-  if (right != rests_.begin() && (right - 1)->t > a.t) a = *(right - 1);
-  if (right != rests_.end() && right->t < b.t) b = *right;
-  for (double h = b.t - a.t; a.t < t && h > 1.5 * std::ldexp(step_, -kHalvings); h = b.t - a.t) {
+void JointDensePath::draw_rests(double t, Rng& rng) {
+  const std::size_t piece = before(t);
+  const double intensity = points_[piece].intensity;
+  if (!(intensity > 0) || t == points_[piece].t || piece + 1 == points_.size()) return;
+  const double shortest = 1.5 * std::ldexp(points_[piece + 1].t - points_[piece].t, -kHalvings);
+  auto [a, b] = rests_around(piece, t);
+  for (double h = b.t - a.t; a.t < t && h > shortest; h = b.t - a.t) {
     const Rest middle{
         a.t + h / 2,
         (a.g + b.g) / 2 + h * (a.dg - b.dg) / 8 +
             std::sqrt(intensity * h * h * h / 192) * rng.normal(),
         1.5 * (b.g - a.g) / h - (a.dg + b.dg) / 4 + std::sqrt(intensity * h / 16) * rng.normal()};
     counters_->line_normals += 2;
-    right = rests_.insert(right, middle);
-    if (middle.t <= t) {
-      a = middle;
-      ++right;
-    } else {
-      b = middle;
-    }
+    rests_.insert(std::upper_bound(rests_.begin(), rests_.end(), middle.t,
+                                   [](double x, const Rest& rest) { return x < rest.t; }),
+                  middle);
+    (middle.t <= t ? a : b) = middle;
   }
+}
+
+void JointDensePath::read(double t, double& g, double& dg) const {
+  const std::size_t piece = before(t);
+  const Point& a = points_[piece];
+  g = a.g;
+  dg = a.dg;
+  if (t == a.t || piece + 1 == points_.size()) return;
+  const Point& b = points_[piece + 1];
+  cubic(a.t, a.g, a.dg, b.t, b.g, b.dg, t, g, dg);
+  if (!(a.intensity > 0)) return;
+  const auto [left, right] = rests_around(piece, t);
   double rest, slope;
-  cubic(a.t, a.g, a.dg, b.t, b.g, b.dg, t, rest, slope);
+  cubic(left.t, left.g, left.dg, right.t, right.g, right.dg, t, rest, slope);
   g += rest;
   dg += slope;
 }
 
-void JointDensePath::at(long cell, double t, Rng& rng, double& g, double& dg) {
-  double a, da, b, db;
-  at_left(cell, a, da);
+void JointDensePath::at_right(long cell, double& g, double& dg) const {
   if (std::isinf(step_)) {
-    g = a;
-    dg = da;
+    g = points_[0].g;
+    dg = points_[0].dg;
     return;
   }
-  at_right(cell, b, db);
-  const double begin = anchor_ + cell * step_;
-  cubic(begin, a, da, begin + step_, b, db, t, g, dg);
-  if (!covariance_->smooth()) add_rest(cell, t, rng, g, dg);
+  read(cell_end(cell), g, dg);
+}
+
+void JointDensePath::at(long, double t, Rng& rng, double& g, double& dg) {
+  draw_rests(t, rng);
+  read(t, g, dg);
+}
+
+double JointDensePath::deviation(double a, double h) const {
+  if (std::isinf(step_)) return 0;
+  const std::size_t piece = before(a);
+  const bool whole = piece + 1 >= points_.size() || points_[piece + 1].t >= a + h;
+  return whole ? bridge_bound(points_[piece].intensity, h) : deviation_over_points(piece, a, h);
+}
+
+// Over points the path is off that cubic by one in every piece, of Bernstein's coefficients c, and
+// what bridges add. In the inner ones (B₁+B₂)(s) = 3s(1-s) is that of their ends at least; in the
+// first, w of the whole, c₀ = c₁ = 0, and at a fraction u of it 3uw(1-uw) are there to hold
+// 3u²(1-u)|c₂| + u³|c₃| and the bridge's 3u(1-u).
+double JointDensePath::deviation_over_points(std::size_t piece, double a, double h) const {
+  Point left{a, 0, 0}, end{a + h, 0, 0};
+  read(a, left.g, left.dg);
+  read(end.t, end.g, end.dg);
+  const Point begin = left;
+  const auto off = [&](const Point& p) {
+    double g, dg;
+    cubic(a, begin.g, begin.dg, end.t, end.g, end.dg, p.t, g, dg);
+    return std::array{p.g - g, p.dg - dg};
+  };
+  double largest = 0;
+  for (std::array<double, 2> e0{0, 0}; left.t < end.t; ++piece) {
+    const bool last = piece + 1 >= points_.size() || points_[piece + 1].t >= end.t;
+    const Point right = last ? end : points_[piece + 1];
+    const std::array<double, 2> e1 = last ? std::array{0.0, 0.0} : off(right);
+    const double k = right.t - left.t, w = k / h;
+    const double c[] = {std::abs(e0[0]), std::abs(e0[0] + e0[1] * k / 3),
+                        std::abs(e1[0] - e1[1] * k / 3), std::abs(e1[0])};
+    const double bridge = bridge_bound(points_[piece].intensity, k);
+    if (left.t == a) {
+      largest = std::max(largest, (c[2] / 4 + c[3] / 3) / (w * (1 - w)) + bridge / w);
+    } else if (last) {
+      largest = std::max(largest, (c[1] / 4 + c[0] / 3) / (w * (1 - w)) + bridge / w);
+    } else {
+      const double s = (left.t - a) / h, u = (right.t - a) / h;
+      largest = std::max(largest, (*std::max_element(c, c + 4) + 0.75 * bridge) /
+                                      (3 * std::min(s * (1 - s), u * (1 - u))));
+    }
+    left = right;
+    e0 = e1;
+  }
+  return largest;
 }
 
 std::unique_ptr<LineSampler> make_joint_dense(const GaussianProcess& process, const Box3& bounds) {

@@ -1,12 +1,15 @@
 // Sampler 5, dense, where covariances differ from line to line (tensor fields, kernels without
-// normal form, off-line conditions): values and slopes of g drawn jointly at points of a fixed
-// spacing, all given all before; in between the cubic through both. A rough path (the third
-// derivative of its covariance jumps at 0: Matérn 3/2, Wong) has the slopes of a Brownian motion: a
-// cubic leaves 6 % of their variance out, so what it misses is added, the bridge of an integrated
-// Brownian motion between both ends, halved as far as it is asked for. The last resort.
+// normal form, off-line conditions): values and slopes of g drawn jointly at points, all given all
+// before; in between the cubic through both. Points are as close as the lengths around them ask
+// for. A rough path (the third derivative of its covariance jumps at 0: Matérn 3/2, Wong) has the
+// slopes of a Brownian motion: a cubic leaves 6 % of their variance out, so what it misses is
+// added, the bridge of an integrated Brownian motion between both ends, halved as far as it is
+// asked for. The last resort.
 #pragma once
 
+#include "process/dense_points.h"
 #include "process/joint_line.h"
+#include "process/survey.h"
 
 namespace gpis {
 
@@ -16,7 +19,7 @@ class JointDensePath : public JointLine {
   static constexpr double kLastStep = 1e-5;
   struct Plan : JointLine::Plan {
     Plan(const GaussianProcess& process, const Box3& bounds);
-    double spacing;  // of points, in the shortest length scale of the line
+    DensePoints::Spacing spacing;
   };
 
   void reset(const Plan& plan, const LineGeometry& line, double anchor, double t_end,
@@ -25,25 +28,34 @@ class JointDensePath : public JointLine {
   void start_free(Rng& rng, Counters& counters, double& g, double& dg);
   double start(const PathStart& known, Rng& rng, Counters& counters);
   void prepare(long cell, Rng& rng, Counters& counters);
-  void at_left(long cell, double& g, double& dg) const;
-  void at_right(long cell, double& g, double& dg) const { at_left(cell + 1, g, dg); }
+  void at_right(long cell, double& g, double& dg) const;
   void at(long cell, double t, Rng& rng, double& g, double& dg);
   double deviation(double a, double h) const;
 
  private:
   struct Point {
-    long index;  // anchor + index · step
-    double g, dg;
-    double intensity = 0;  // of the noise that drives the slope, in the cell behind it
+    double t, g, dg;
+    double intensity = 0;  // of the noise that drives the slope, up to the next point
   };
-  // What the path adds to its cubics, at points within cells; nothing at their ends.
+  // What the path adds to its cubics, at points within them; nothing at their ends.
   struct Rest {
     double t, g, dg;
   };
-  void draw(long index, Rng& rng, Counters& counters);
-  const Point& point_of(long cell) const;
-  void add_rest(long cell, double t, Rng& rng, double& g, double& dg);
+  static double error_on(const Plan& plan, const SurveyLine& line);
+  static double lost_on(const Plan& plan, const SurveyLine& line);
 
+  void draw(double t, Rng& rng, Counters& counters);
+  void extend(Rng& rng, Counters& counters);
+  double cell_end(long cell) const { return anchor_ + static_cast<double>(cell + 1) * step_; }
+  // The last point not behind t.
+  std::size_t before(double t) const;
+  void draw_rests(double t, Rng& rng);
+  // What is drawn around t, of the piece that holds it.
+  std::array<Rest, 2> rests_around(std::size_t piece, double t) const;
+  void read(double t, double& g, double& dg) const;
+  double deviation_over_points(std::size_t piece, double a, double h) const;
+
+  DensePoints where_;
   double step_ = 1;
   std::vector<Point> points_;  // in increasing order
   std::vector<Rest> rests_;    // in increasing order

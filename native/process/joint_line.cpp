@@ -5,6 +5,9 @@
 namespace gpis {
 namespace {
 
+// Times the shortest length scale: as far as is looked ahead where no longest one is known.
+constexpr double kLongest = 1e3;
+
 Eigen::Vector4d of(const Functional& f) {
   return {f.value, f.slope.x, f.slope.y, f.slope.z};
 }
@@ -38,6 +41,7 @@ void JointLine::begin(const Plan& plan, const LineGeometry& line, double anchor,
     rows_.reset(base_);
   }
   rebased_ = false;
+  lost_ = 0;
   lasting_rows_ = rows_.count();
   if (covariance_->anisotropy()) {
     ++counters.tensor_lookups;
@@ -73,11 +77,39 @@ bool JointLine::forgets(double t) const {
 void JointLine::reach(double t, Counters& counters) {
   if (!forgets(t)) return;
   const int block = posterior_ ? posterior_->block(line_.origin + line_.direction * t) : -1;
-  const int own = rows_.active() - base_.count();
-  if (block != block_) begin_base(block, counters);
+  const bool same = block == block_;
+  const int given = base_.count();
+  if (!same) begin_base(block, counters);
   ++counters.factorisations;
   rebased_ = true;
-  rows_.rebase(base_, std::min(own, kKept));
+  lost_ = std::max(lost_, rows_.rebase(base_, given, same, kKept, ahead(t)));
+}
+
+// At distances that grow by half, so that no wave meets all of them in the same phase; slopes
+// where they are not but differences of these values.
+std::vector<JointRows::Ahead> JointLine::ahead(double t) const {
+  std::vector<JointRows::Ahead> out;
+  const double length = covariance_->length_scale(point(t), line_.direction);
+  const double end = 4 * std::min(covariance_->longest_length() / gpis::length(line_.direction),
+                                  kLongest * length);
+  for (double h = 0; h <= end; h = h == 0 ? 0.3 * length : 1.5 * h) {
+    const LocalPoint at = point(t + h);
+    const LinePoint on_line = rows_.has_line() ? rows_.line().at(t + h, at) : LinePoint{};
+    out.push_back({at, on_line, value_row()});
+    if (h < length) out.push_back({at, on_line, slope_row()});
+  }
+  return out;
+}
+
+double JointLine::near_length(double t_end) const {
+  if (covariance_->stationary()) return covariance_->length_scale(at_anchor_, line_.direction);
+  const LineRows& line = rows_.line();
+  double shortest = line.plain_length_scale(on_line_at_anchor_);
+  for (const double lengths : {1.0, 3.0}) {
+    const double t = anchor_ + lengths * shortest;
+    if (t < t_end) shortest = std::min(shortest, line.plain_length_scale(line.at(t)));
+  }
+  return shortest;
 }
 
 // A start that conditions or segments fix has no freedom left.

@@ -42,8 +42,8 @@ class JointLine {
 
  protected:
   // More rows of the line itself than these are not kept in one factor: new ones are then drawn
-  // given the last kKept.
-  static constexpr int kMostRows = 240, kKept = 100;
+  // given those kKept that tell most about them.
+  static constexpr int kMostRows = 300, kKept = 200;
 
   void begin(const Plan& plan, const LineGeometry& line, double anchor, Counters& counters);
   LocalPoint point(double t) const { return covariance_->at(line_.origin + line_.direction * t); }
@@ -58,6 +58,10 @@ class JointLine {
   bool alone() const { return !posterior_ && !segments_; }
   Functional value_row() const { return {}; }
   Functional slope_row() const { return {0, line_.direction}; }
+  // Shortest length scale near the anchor, but for the changes of A, which may be sudden.
+  double near_length(double t_end) const;
+  // The largest correlation with what comes that was forgotten on this line.
+  double lost() const { return lost_; }
   // The anchor among the points of the line; null unless lengths vary.
   const LinePoint* line_anchor() const { return rows_.has_line() ? &on_line_at_anchor_ : nullptr; }
 
@@ -70,12 +74,15 @@ class JointLine {
  private:
   // Starts base_ with the conditions of a block and the segments.
   void begin_base(int block, Counters& counters);
+  // Values and slopes from t on, for as far as lengths reach.
+  std::vector<JointRows::Ahead> ahead(double t) const;
 
   JointRows base_;  // never forgotten; the line's own rows come after them
   int lasting_rows_ = 0;
   bool base_has_segments_ = false, rebased_ = false;
   PosteriorPtr posterior_;
   int block_ = -1;
+  double lost_ = 0;
   const SegmentMemory* segments_ = nullptr;
   double sign_ = 1, pull_ = 0;
   LinePoint on_line_at_anchor_;

@@ -1,6 +1,12 @@
 #include "process/joint_rows.h"
 
 namespace gpis {
+namespace {
+
+// Of variances ahead, relative: a row that lowers them by less in all is not worth keeping.
+constexpr double kTelling = 1e-9;
+
+}  // namespace
 
 void JointRows::reset(const Covariance& covariance) {
   covariance_ = &covariance;
@@ -98,7 +104,7 @@ double JointRows::add_free(const LocalPoint& at, const Functional& what, Rng& rn
   const double variance = (1 + jitter) * own(at, what, on_line);
   double mean;
   const double pivot = border(at, what, variance, mean, on_line);
-  if (!(pivot > drawn_pivot(on_line) * variance)) {
+  if (!(pivot > (jitter > 0 ? kPivot : kDrawnPivot) * variance)) {
     ++counters.pivots_dropped;
     return mean;
   }
@@ -110,9 +116,66 @@ double JointRows::add_free(const LocalPoint& at, const Functional& what, Rng& rn
   return value;
 }
 
-void JointRows::rebase(const JointRows& base, int last) {
-  const int first_kept = count() - last;
-  std::vector<Row> kept(rows_.end() - last, rows_.end());
+// Rows are chosen one by one, each as the one that lowers the variances ahead most (relative to
+// what they are), in units of the rows' independent parts behind those given.
+JointRows::Kept JointRows::telling(int given, int most, const std::vector<Ahead>& ahead) {
+  const int n = active() - given, m = static_cast<int>(ahead.size());
+  // Row-major: products take the first entries of rows.
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> rows(n, n);
+  rows.setZero();
+  for (int i = 0; i < n; ++i) {
+    rows.row(i).head(i) = factor_row(given + i).tail(i).transpose();
+    rows(i, i) = diagonal(given + i);
+  }
+  Eigen::MatrixXd them(m, n);
+  for (int j = 0; j < m; ++j) {
+    const Ahead& to = ahead[static_cast<std::size_t>(j)];
+    const LinePoint* on_line = has_line_ ? &to.on_line : nullptr;
+    const double variance = own(to.at, to.what, on_line);
+    double mean;
+    border(to.at, to.what, variance, mean, on_line);
+    them.row(j) = next_.segment(given, n).transpose() / std::sqrt(variance);
+  }
+  const Eigen::VectorXd whole = rows.rowwise().squaredNorm();
+  Eigen::VectorXd left = whole, of_best(n);
+  Eigen::MatrixXd shared = rows * them.transpose();  // what is left of it, too
+  Kept out;
+  out.factor.resize(n, std::min(most, n));
+  std::vector<bool> kept(static_cast<std::size_t>(n), false);
+  for (int k = 0; k < out.factor.cols(); ++k) {
+    int best = -1;
+    double tells = kTelling;
+    for (int i = 0; i < n; ++i) {
+      if (kept[static_cast<std::size_t>(i)] || !(left[i] > least_pivot(row(given + i)) * whole[i]))
+        continue;
+      const double by = shared.row(i).squaredNorm() / left[i];
+      if (by > tells) {
+        best = i;
+        tells = by;
+      }
+    }
+    if (best < 0) break;
+    kept[static_cast<std::size_t>(best)] = true;
+    out.rows.push_back(best);
+    of_best.noalias() = rows.leftCols(best + 1) * rows.row(best).head(best + 1).transpose();
+    of_best.noalias() -= out.factor.leftCols(k) * out.factor.row(best).head(k).transpose();
+    const double root = std::sqrt(left[best]);
+    out.factor.col(k) = of_best / root;
+    left -= out.factor.col(k).cwiseAbs2();
+    const Eigen::RowVectorXd told = shared.row(best) / root;
+    shared.noalias() -= out.factor.col(k) * told;
+  }
+  for (int i = 0; i < n; ++i)
+    if (!kept[static_cast<std::size_t>(i)])
+      out.lost = std::max(out.lost, shared.row(i).cwiseAbs().maxCoeff() / std::sqrt(whole[i]));
+  return out;
+}
+
+// The rows kept come in the order in which they were chosen: as they were, given the same base.
+double JointRows::rebase(const JointRows& base, int given, bool same, int most,
+                         const std::vector<Ahead>& ahead) {
+  const Kept kept = telling(given, most, ahead);
+  const int first = base_ + given;
   base_ = count();
   const auto from = base.rows_.begin() + base.base_;
   rows_.insert(rows_.end(), from, base.rows_.end());
@@ -121,22 +184,37 @@ void JointRows::rebase(const JointRows& base, int last) {
     row->on_line = false;
     if (has_line_) line_.add(nullptr, row->at, row->what);
   }
+  const std::vector<double> before = std::move(factor_);
   factor_ = base.factor_;
   xi_ = base.xi_;
   known_norm2_ = base.known_norm2_;
-  for (int i = 0; i < last; ++i) {
-    Row& row = kept[static_cast<std::size_t>(i)];
+  for (std::size_t k = 0; k < kept.rows.size(); ++k) {
+    const int index = first + kept.rows[k];
+    Row row = rows_[static_cast<std::size_t>(index)];
     row.copied = true;
-    LinePoint point;
-    if (row.on_line) point = line_.point(first_kept + i);
-    const LinePoint* on_line = row.on_line ? &point : nullptr;
-    const double variance = own(row.at, row.what, on_line) + row.noise;
-    double mean;
-    const double pivot = border(row.at, row.what, variance, mean, on_line);
-    if (!(pivot > (row.known ? kPivot : drawn_pivot(on_line)) * variance)) continue;
+    double mean = 0, pivot;
+    if (same) {
+      const auto i = static_cast<std::size_t>(given + kept.rows[k]);
+      const double* of_base = before.data() + i * (i + 1) / 2;
+      const int n = active();
+      for (int j = 0; j < n; ++j) {
+        next_[j] = j < given ? of_base[j] : kept.factor(kept.rows[k], j - given);
+        mean += next_[j] * xi_[static_cast<std::size_t>(j)];
+      }
+      const double root = kept.factor(kept.rows[k], static_cast<Eigen::Index>(k));
+      pivot = root * root;
+    } else {
+      LinePoint point;
+      if (row.on_line) point = line_.point(index);
+      const LinePoint* on_line = row.on_line ? &point : nullptr;
+      const double variance = own(row.at, row.what, on_line) + row.noise;
+      pivot = border(row.at, row.what, variance, mean, on_line);
+      if (!(pivot > least_pivot(row) * variance)) continue;
+    }
     append(row, pivot, (row.value - mean) / std::sqrt(pivot));
-    if (has_line_) line_.add_copy(first_kept + i);
+    if (has_line_) line_.add_copy(index);
   }
+  return kept.lost;
 }
 
 Eigen::VectorXd JointRows::whitened(const LocalPoint& at, const Functional& what) const {

@@ -16,10 +16,11 @@ class JointRows {
   // A row is left out where the rows before leave it less variance than this, relative to its own:
   // known ones (definitions B11), and drawn ones. Rounding reaches the variance left to later rows
   // multiplied by the square of weights that grow as 1/√pivot: rows come in the order of the line
-  // and not of their pivots, so drawn ones, which nobody misses, are left out earlier. Where
-  // lengths vary still earlier: at 1e-7 covariances behind a sudden change of them were off by 100
-  // on some lines. What is left out is a kink of the path, of its root in slope deviations.
-  static constexpr double kPivot = 1e-10, kDrawnPivot = 1e-7, kVaryingPivot = 1e-5;
+  // and not of their pivots, so drawn ones, which nobody misses, are left out earlier. At 1e-7
+  // covariances behind a sudden change of lengths were off by 100 on some lines, and those of waves
+  // much shorter than the lengths beside them by .5. What is left out is a kink of the path, of its
+  // root in slope deviations.
+  static constexpr double kPivot = 1e-10, kDrawnPivot = 1e-5;
 
   void reset(const Covariance& covariance);
   // Starts with the rows of another: solved once, used by many.
@@ -49,8 +50,17 @@ class JointRows {
   // variance; its value.
   double add_free(const LocalPoint& at, const Functional& what, Rng& rng, Counters& counters,
                   double jitter = 0, const LinePoint* on_line = nullptr);
-  // From now on rows are drawn given those of `base` and the `last` active rows alone.
-  void rebase(const JointRows& base, int last);
+  // From now on rows are drawn given those of `base` and at most `most` of the active rows alone:
+  // those that tell most about what lies `ahead`. The largest correlation with any of that which
+  // the others still have, given what is kept. The first `given` of the active rows are those of a
+  // base, of this one where it is the `same`.
+  struct Ahead {
+    LocalPoint at;
+    LinePoint on_line;  // where rows may lie on a line
+    Functional what;
+  };
+  double rebase(const JointRows& base, int given, bool same, int most,
+                const std::vector<Ahead>& ahead);
 
   // Law of (g, ∇g) at a point, given the active rows; `on_line` as above.
   void law(const LocalPoint& at, Eigen::Vector4d& mean, Eigen::Matrix4d& covariance) const;
@@ -113,8 +123,9 @@ class JointRows {
     bool copied = false;  // from a base, or kept when others were forgotten
     bool on_line = false;
   };
-  static double drawn_pivot(const LinePoint* on_line) {
-    return on_line ? kVaryingPivot : kDrawnPivot;
+  // Noise keeps rows apart.
+  static double least_pivot(const Row& row) {
+    return row.known || row.noise > 0 ? kPivot : kDrawnPivot;
   }
   using FactorRow = Eigen::Map<const Eigen::VectorXd>;
 
@@ -137,6 +148,14 @@ class JointRows {
   void covariances(const LocalPoint& at, const Functional& what, const LinePoint* on_line);
   double own(const LocalPoint& at, const Functional& what, const LinePoint* on_line) const;
   void append(const Row& row, double pivot, double xi);
+  // Which of the active rows behind the first `given` to keep, in the order of what they tell, the
+  // factor of all by them, and see rebase.
+  struct Kept {
+    std::vector<int> rows;
+    Eigen::MatrixXd factor;
+    double lost = 0;
+  };
+  Kept telling(int given, int most, const std::vector<Ahead>& ahead);
 
   const Covariance* covariance_ = nullptr;
   std::vector<Row> rows_;

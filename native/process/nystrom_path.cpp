@@ -86,21 +86,9 @@ void NystromPath::reset(const Plan& plan, const LineGeometry& line, double ancho
   begin(plan, line, anchor, counters);
   plan_ = &plan;
   t_end_ = t_end;
-  step_ = varies() ? plan_step(t_end) : survey_step(*covariance_, line, anchor, t_end);
+  step_ = (varies() ? plan_->spacing : 0.5) * near_length(t_end);
   margin_ = -1;
   enter(anchor, anchor);
-}
-
-// The spacing of nodes at the shortest length scale near the anchor, but for the changes of A,
-// which may be sudden: where others follow, nodes and steps come closer by themselves.
-double NystromPath::plan_step(double t_end) const {
-  const LineRows& line = rows_.line();
-  double shortest = line.plain_length_scale(*line_anchor());
-  for (const double lengths : {1.0, 3.0}) {
-    const double t = anchor_ + lengths * shortest;
-    if (t < t_end) shortest = std::min(shortest, line.plain_length_scale(line.at(t)));
-  }
-  return plan_->spacing * shortest;
 }
 
 NystromPath::Node NystromPath::node(double t) const {
@@ -133,8 +121,9 @@ double NystromPath::start(const PathStart& known, Rng& rng, Counters& counters) 
   return slope;
 }
 
-// As far as the lengths at both allow, and the kinks between: where A has sharp ones, as along the
-// crease of a fit, lengths may be short between two places where they are long. Where lengths vary,
+// As far as the lengths at both allow (half as far until the next one does: what is short may be in
+// that one place), and the kinks between: where A has sharp ones, as along the crease of a fit,
+// lengths may be short between two places where they are long. Where lengths vary,
 // at the ends of cells if these are no farther apart: what is known at a node serves the march too.
 NystromPath::Node NystromPath::after(const Node& last) const {
   const auto farther = [&](double length) {
@@ -143,10 +132,8 @@ NystromPath::Node NystromPath::after(const Node& last) const {
     return anchor_ + std::floor((t - anchor_) / step_ + 1e-6) * step_;
   };
   Node next = node(farther(last.length_scale));
-  if (next.length_scale < last.length_scale) {
-    const double t = farther(next.length_scale);
-    if (t < next.t) next = node(t);
-  }
+  while (next.t - last.t > (1 + 1e-6) * plan_->spacing * next.length_scale)
+    next = node(last.t + 0.5 * (next.t - last.t));
   if (!varies()) return next;
   for (int i = 0; i < kMostHalvings; ++i) {
     const double h = next.t - last.t;

@@ -54,7 +54,6 @@ class NystromPath : public JointLine {
 
   Node node(double t) const;
   Node after(const Node& node) const;
-  double plan_step(double t_end) const;
   void begin_at_anchor(double g, double dg);
   double error_in(const Interval& interval);
   void extend(Rng& rng, Counters& counters);

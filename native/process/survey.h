@@ -13,11 +13,9 @@ struct SurveyLine {
   double end;  // from t = 0
 };
 
-// Lines of a few length scales around the middle of the bounds, along axes and diagonals.
-std::vector<SurveyLine> survey_lines(const Covariance& covariance, const Box3& bounds);
-
-// A step that suits all of a line: half of the shortest length scale found on it.
-double survey_step(const Covariance& covariance, const LineGeometry& line, double t_begin,
-                   double t_end);
+// Lines of so many length scales (most lines end before) around the middle of the bounds, along
+// axes and diagonals, and across the places where lengths are shortest and change most.
+std::vector<SurveyLine> survey_lines(const Covariance& covariance, const Box3& bounds,
+                                     double lengths = 12);
 
 }  // namespace gpis

@@ -222,6 +222,11 @@ std::vector<Case> cases() {
        {automatic, markov, dense}},
       {make<ProductKernel>(make<Matern>(2.5, 1.0), make<SquaredExponential>(2.0)),
        {automatic, dense}},
+      // Of many turns per length scale.
+      {make<ProductKernel>(make<Matern>(2.5, 5.0), make<PlaneWave>(Vec3{20, 0, 0})), {automatic}},
+      {make<SumKernel>(make<ScaledKernel>(0.5, make<PlaneWave>(Vec3{30, 0, 0})),
+                       make<ScaledKernel>(0.5, make<SquaredExponential>(0.5))),
+       {automatic, nystrom}},
   };
 }
 
@@ -263,6 +268,10 @@ TEST(implied_covariance_over_long_distances) {
         test::context() = c.kernel->describe() + ", " + kNames[static_cast<int>(sampler)];
         check(process(c.kernel), sampler, start, kLong);
       }
+  const KernelPtr periodic = make<ProductKernel>(
+      make<LocallyPeriodic>(5.0, 1.8, Vec3{1, 0, 0}, 0.6), make<Matern>(2.5, 5.0));
+  test::context() = periodic->describe();  // more rows than a line keeps
+  check(process(periodic), automatic, false, kLong);
   for (const auto& [name, field] : fields()) {
     test::context() = std::string("long, ") + name;
     check(process(make<SquaredExponential>(1.0), field), automatic, false, kLong);
@@ -279,6 +288,17 @@ TEST(implied_covariance_of_varying_length_scales) {
         test::context() = kernel->describe() + ", " + name;
         check(process(kernel, field), automatic, start);
       }
+  // Bridges are drawn where the march asks for them, in the order in which it does: along a crease
+  // not the same for all rays (tests/native/test_joint.py has those).
+  const auto crease = test::along_x(test::crease, 101), dab = test::along_x(test::dab, 201);
+  for (const auto& [kernel, field] : {std::pair{kernels[0], crease},
+                                      {kernels[3], crease},
+                                      {kernels[1], dab},
+                                      {kernels[2], dab},
+                                      {kernels[3], dab}}) {
+    test::context() = kernel->describe() + (field == dab ? ", dab" : ", crease");
+    check(process(kernel, field), automatic, field == crease);
+  }
   test::context().clear();
 }
 

@@ -18,6 +18,7 @@ KERNELS = {
     "wong": gn.Wong(1),
 }
 BOUNDS = ((-2, -2, -2), (8, 2, 2))
+PLACE = np.array([0.3, -0.2, 0.1])
 
 
 def process(field, kernel="se", mean=0.0, sigma=1.0):
@@ -53,33 +54,130 @@ def test_implied_correlation(field, kernel, full_size, seed):
     check_z(g.mean(axis=0), 0, 1 / np.sqrt(len(g)), "mean")
 
 
-@pytest.mark.parametrize("kernel", ["se", "rq"])
-def test_crease(kernel, full_size, seed):
-    """Lengths a tenth at one node, as a fit has them where operands meet: nodes of the path find it, and steps are divided
-    at the kinks of the grid alone."""
-    field = along_x(lambda x: isotropic(0.1 if abs(x - 2) < 0.05 else 1.0), 8, 101)
-    gp = gn.GaussianProcess(5.0, 1.0, KERNELS[kernel], anisotropy=field, bounds=BOUNDS)
+def grid(length_at, nodes=41):
+    """Lengths that vary in three dimensions, over a cube from -1 to 1."""
+    axis = np.linspace(-1, 1, nodes)
+    length = length_at(np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1))
+    entries = np.concatenate([np.repeat((length**2)[..., None], 3, -1), np.zeros((*length.shape, 3))], -1)
+    return gn.TensorGridField(entries, axis[1] - axis[0], [-1] * 3)
+
+
+def dab(x, at=PLACE, radius=0.3, long=0.5, short=0.05):
+    """Painted with a brush: smooth, from long to short."""
+    q = np.clip(np.linalg.norm(x - at, axis=-1) / radius, 0, 1)
+    return long * (short / long) ** ((1 - q * q) ** 2)
+
+
+SHORT = {
+    "crease": lambda: along_x(lambda x: isotropic(0.1 if abs(x - 2) < 0.05 else 1.0), 8, 101),
+    "one node": lambda: grid(lambda x: np.where(np.linalg.norm(x - PLACE, axis=-1) < 0.04, 0.1, 0.5), 21),
+    "dab": lambda: grid(dab),
+}
+WITH_SUM = KERNELS | {"sum": 0.5 * gn.SquaredExponential(1) + 0.5 * gn.Matern(2.5, 1)}
+
+
+def short_lengths(field, kernel, mean):
+    """A process whose lengths are short in one place, and a ray across it: (process, origin, direction, t of the place)."""
+    if field == "crease":
+        gp = gn.GaussianProcess(mean, 1.0, WITH_SUM[kernel], anisotropy=SHORT[field](), bounds=BOUNDS)
+        return gp, np.zeros(3), np.array([0.96, 0.28, 0]), 2 / 0.96
+    gp = gn.GaussianProcess(mean, 1.0, WITH_SUM[kernel], anisotropy=SHORT[field](), bounds=((-1,) * 3, (1,) * 3))
+    direction = np.array([0.8, 0.36, 0.48])
+    return gp, PLACE - 0.7 * direction, direction, 0.7
+
+
+@pytest.mark.parametrize("kernel", WITH_SUM)
+@pytest.mark.parametrize("field", SHORT)
+def test_lengths_that_are_short_in_one_place(field, kernel, full_size, seed):
+    """At one node, as a fit has them where operands meet, or where a brush was set down: points find the place, steps are
+    divided at the kinks of the grid alone, and what lies before it is not forgotten behind it."""
+    gp, origin, direction, place = short_lengths(field, kernel, 5.0)
     assert 0 < float(gp.plan()["correlation_error"]) < 1e-3
-    n, direction = (10_000 if full_size else 2_000) // (1 if kernel == "se" else 4), np.array([0.96, 0.28, 0])
-    t = np.array([0.05, 1.0, 1.7, 1.95, 2.0, 2.04, 2.083, 2.12, 2.2, 2.6])
-    g = gn.line_values(gp, *along(n, direction), t, tolerance=1e-6, seed=seed) - 5
+    n = (10_000 if full_size else 1_600) // (1 if kernel == "se" else 8)
+    t = place + np.array([-0.6, -0.3, -0.15, -0.04, 0, 0.004, 0.03, 0.08, 0.2, 0.5])
+    g = gn.line_values(gp, *along(n, direction, origin), t, tolerance=1e-6, seed=seed) - 5
     g = g[np.isfinite(g).all(axis=1)]
     assert len(g) > 0.99 * n
-    k = gp.covariance(t[:, None] * direction, t[:, None] * direction)
+    x = origin + t[:, None] * direction
+    k = gp.covariance(x, x)
     error = np.sqrt((np.outer(np.diag(k), np.diag(k)) + k**2) / len(g))
     check_z(np.maximum(np.abs(g.T @ g / len(g) - k) - 1e-3, 0), 0, error, "covariance")
-    rough = gn.GaussianProcess(gn.PlaneField([0, 0, 0], [0, 0, 1]), 0.3, KERNELS[kernel], anisotropy=field, bounds=BOUNDS)
-    counters = hits_twice(rough, 500, "auto", seed)[1]["counters"]
+    steps = np.diff(np.eye(len(t)), axis=0)
+    of_steps = np.diag(steps @ k @ steps.T)
+    check_z((np.diff(g, axis=1) ** 2).mean(axis=0) / of_steps, 1, np.sqrt(2 / len(g)) + 1e-3 / of_steps, "increments")
+
+
+@pytest.mark.parametrize("kernel", ["se", "matern 3/2", "matern 5/2", "wong"])
+@pytest.mark.parametrize("field", SHORT)
+def test_first_hits_across_short_lengths(field, kernel, full_size, seed):
+    """Against paths drawn from the covariance at points that come as close as the lengths do."""
+    gp, origin, direction, place = short_lengths(field, kernel, 0.6)
+    near, n = (
+        np.geomspace(1e-5, 0.5, 120 if kernel == "se" else 320),
+        (20_000 if full_size else 2_000) // (1 if kernel == "se" else 2),
+    )
+    t = np.concatenate([place - near[::-1], [place], place + near])
+    x = origin + t[:, None] * direction
+    values, vectors = np.linalg.eigh(gp.covariance(x, x))
+    paths = 0.6 + np.random.default_rng(seed).normal(size=(2 * n, len(t))) @ (vectors * np.sqrt(np.maximum(values, 0))).T
+    paths = paths[paths[:, 0] > 0]
+    below = paths < 0
+    expected = np.where(below.any(axis=1), t[np.argmax(below, axis=1)] - t[0], np.inf)
+    start = origin + t[0] * direction
+    hits = gn.first_hits(gp, *along(n, direction, start), 1.0, seed=seed)
+    check_same_distribution(hits["t"], expected, "t")
+    assert hits["counters"]["line_split_limit"] == hits["counters"]["line_entry_inside"] == 0
+
+
+@pytest.mark.parametrize("kernel", ["se", "rq"])
+def test_steps_across_a_crease(kernel, seed):
+    gp = gn.GaussianProcess(
+        gn.PlaneField([0, 0, 0], [0, 0, 1]), 0.3, KERNELS[kernel], anisotropy=SHORT["crease"](), bounds=BOUNDS
+    )
+    counters = hits_twice(gp, 500, "auto", seed)[1]["counters"]
     assert counters["line_split_limit"] == 0
     assert counters["line_evaluations"] < 80 * counters["line_segments"] and counters["line_splits"] > 0
 
 
-def test_a_sampler_that_is_wrong_says_so():
-    """Rough kernels at the same crease: a path between points of one spacing cannot follow it."""
-    field = along_x(lambda x: isotropic(0.1 if abs(x - 2) < 0.05 else 1.0), 8, 101)
-    for kernel, warned in ((gn.Matern(2.5, 1), True), (gn.SquaredExponential(1), False)):
-        plan = gn.GaussianProcess(5.0, 1.0, kernel, anisotropy=field, bounds=BOUNDS).plan()
-        assert ("warning_covariance" in plan) == warned == (float(plan["correlation_error"]) > 0.01)
+def test_one_length_a_thousandth_of_the_others(seed):
+    """Points creep towards it by half of the way, not by a thousandth: lines have hundreds of them, not a million."""
+    field = along_x(lambda x: isotropic(1e-3 if abs(x - 2) < 0.05 else 1.0), 8, 101)
+    for kernel in (gn.SquaredExponential(1), gn.Matern(2.5, 1)):
+        gp = gn.GaussianProcess(5.0, 1.0, kernel, anisotropy=field, bounds=BOUNDS)
+        counters = gn.first_hits(gp, *along(20, np.array([1.0, 0, 0]), (0.2, 0.1, 0)), 5, tolerance=1e-6)["counters"]
+        assert 20 * 20 < counters["tensor_lookups"] < 1_000 * 20
+        assert float(gp.plan()["correlation_error"]) < 1e-3
+
+
+# Of many turns or many changes per length scale: rows that all but determine each other, and more of them than are kept.
+@pytest.mark.parametrize(
+    ("kernel", "sampler", "conditions"),
+    [
+        (gn.LocallyPeriodic(5, 0.6, [1, 0, 0], 0.5) * gn.Matern(2.5, 5), "auto", False),
+        (gn.Matern(2.5, 10) * gn.PlaneWave([30, 0, 0]), "auto", False),
+        (0.5 * gn.PlaneWave([30, 0, 0]) + 0.5 * gn.SquaredExponential(0.5), "nystrom", False),
+        (0.5 * gn.PlaneWave([60, 0, 0]) + 0.5 * gn.SquaredExponential(0.5), "auto", True),
+    ],
+    ids=str,
+)
+def test_kernels_of_two_scales(kernel, sampler, conditions, full_size, seed):
+    n, t = 2_000 if full_size else 150, np.array([0.05, 0.36, 0.67, 0.98, 1.3, 1.6, 1.9])
+    far = {"points": [[-1.4, 0.9, 0.9]], "values": [5.1]} if conditions else None
+    gp = gn.GaussianProcess(5.0, 1.0, kernel, bounds=((-1.5,) * 3, (1.5,) * 3), conditions=far)
+    direction, origin = np.array([0.96, 0.28, 0]), np.array([-1.3, -0.3, 0.05])
+    g = gn.line_values(gp, *along(n, direction, origin), t, tolerance=1e-6, sampler=sampler, seed=seed) - 5
+    g = g[np.isfinite(g).all(axis=1)]
+    assert len(g) > 0.99 * n
+    x, mean = origin + t[:, None] * direction, 0
+    k = kernel(x, x)
+    if conditions:
+        at = np.array(far["points"])
+        weights = kernel(x, at) / kernel(at, at)
+        mean, k = 0.1 * weights[:, 0], k - weights @ kernel(at, x)
+    check_z(g.mean(axis=0), mean, np.sqrt(np.diag(k) / len(g)), "mean")
+    g = g - mean
+    error = np.sqrt((np.outer(np.diag(k), np.diag(k)) + k**2) / len(g))
+    check_z(np.maximum(np.abs(g.T @ g / len(g) - k) - 1e-3, 0), 0, error, "covariance")
 
 
 def test_dense_lines_of_smooth_kernels(full_size, seed):

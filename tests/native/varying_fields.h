@@ -47,4 +47,15 @@ inline SymMat3 stepping(double x) {
   return isotropic(std::pow(4, smooth_step(x - 2)));
 }
 
+// Short at one node of 101, as along the crease of a fit.
+inline SymMat3 crease(double x) {
+  return isotropic(std::abs(x - 2) < 0.05 ? 0.1 : 1);
+}
+
+// Painted with a brush of radius ½.
+inline SymMat3 dab(double x) {
+  const double q = std::min(std::abs(x - 1.2) / 0.5, 1.0), w = (1 - q * q) * (1 - q * q);
+  return isotropic(std::pow(0.05, w));
+}
+
 }  // namespace gpis::test

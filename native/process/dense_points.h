@@ -1,0 +1,50 @@
+// Where the points of a joint dense line stand, and what the cubics between them miss: for any
+// covariance, also where lengths change from one voxel to the next.
+#pragma once
+
+#include "process/covariance.h"
+#include "process/line_rows.h"
+#include "process/path.h"
+
+namespace gpis {
+
+class DensePoints {
+ public:
+  // How close points are: in local length scales; by how far the slope may jump between two, of the
+  // deviation, where A has kinks; and by the share of the variance that a cubic may miss there.
+  struct Spacing {
+    double lengths, kinks, missed;
+    double roughness = 0;  // see roughness_under
+  };
+  // q of Var(g'(t + h) - g'(t)) = q h + O(h²) where A is 1, 0 of smoother paths and of kernels that
+  // take no A.
+  static double roughness_under(const GaussianProcess& process);
+
+  // `lengths`: of the line, where they vary; else null. Points stand at the ends of cells of this
+  // step, and closer where they have to.
+  void reset(const Covariance& covariance, const LineGeometry& line, const LineRows* lengths,
+             const Spacing& spacing, double anchor, double step);
+  // The point behind one at t.
+  double after(double t) const;
+  // That q in the middle of [a, b].
+  double slope_intensity(double a, double b) const;
+  // |implied - exact correlation| that the cubics over two intervals, the same or the second behind
+  // the first, make between points within them; with what bridges add to a rough path.
+  struct Interval {
+    double begin, end;
+  };
+  double error_of_cubics(const Interval& a, const Interval& b) const;
+
+ private:
+  double length_at(double t) const;
+  double farther(double t, double length) const;
+
+  const Covariance* covariance_ = nullptr;
+  LineGeometry line_;
+  const LineRows* lengths_ = nullptr;
+  Spacing spacing_{};
+  double anchor_ = 0, step_ = 1;
+  double intensity_ = 0;  // where lengths are the same everywhere
+};
+
+}  // namespace gpis
