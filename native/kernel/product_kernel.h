@@ -1,13 +1,16 @@
 // k₁ · k₂.
 #pragma once
 
+#include "field/check.h"
 #include "kernel/kernel.h"
 
 namespace gpis {
 
 class ProductKernel : public Kernel {
  public:
-  ProductKernel(KernelPtr a, KernelPtr b) : a_(std::move(a)), b_(std::move(b)) {}
+  ProductKernel(KernelPtr a, KernelPtr b) : a_(std::move(a)), b_(std::move(b)) {
+    check_positive("The variance of a product of kernels", variance());
+  }
 
   double covariance(const Vec3& r) const override { return a_->covariance(r) * b_->covariance(r); }
   Vec3 gradient(const Vec3& r) const override {

@@ -10,6 +10,7 @@ class ScaledKernel : public Kernel {
  public:
   ScaledKernel(double weight, KernelPtr kernel) : weight_(weight), kernel_(std::move(kernel)) {
     check_positive("The weight of a kernel", weight);
+    check_positive("The variance of a kernel times its weight", variance());
   }
 
   double covariance(const Vec3& r) const override { return weight_ * kernel_->covariance(r); }

@@ -1,13 +1,16 @@
 // k₁ + k₂: g is the sum of two independent processes.
 #pragma once
 
+#include "field/check.h"
 #include "kernel/kernel.h"
 
 namespace gpis {
 
 class SumKernel : public Kernel {
  public:
-  SumKernel(KernelPtr a, KernelPtr b) : a_(std::move(a)), b_(std::move(b)) {}
+  SumKernel(KernelPtr a, KernelPtr b) : a_(std::move(a)), b_(std::move(b)) {
+    check_positive("The variance of a sum of kernels", variance());
+  }
 
   double covariance(const Vec3& r) const override { return a_->covariance(r) + b_->covariance(r); }
   Vec3 gradient(const Vec3& r) const override { return a_->gradient(r) + b_->gradient(r); }

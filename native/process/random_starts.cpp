@@ -1,10 +1,16 @@
 // Random starts of a line: truncated normals and the flux-weighted normal (formulas C5, C6), exact
 // however far out they lie.
+#include <algorithm>
 #include <cmath>
 
 #include "process/surface.h"
 
 namespace gpis {
+namespace {
+
+constexpr double kFarthest = 1e300;  // in deviations: sums and products of a few stay finite
+
+}  // namespace
 
 double truncated_normal(double a, Rng& rng) {
   if (a < 0.5) {  // acceptance Φ(-a) > .3
@@ -13,6 +19,8 @@ double truncated_normal(double a, Rng& rng) {
       if (z > a) return z;
     }
   }
+  // From here on, 1/a beyond a is below what a double tells apart; squares end at 1e154.
+  if (a > 1e9) return std::nextafter(std::min(a, kFarthest), kInfinity);
   for (;;) {  // Marsaglia's tail method: never fails, however far out a is
     const double z = std::sqrt(a * a - 2 * std::log(rng.positive_uniform()));
     if (rng.positive_uniform() * z < a) return std::max(z, std::nextafter(a, kInfinity));
@@ -41,10 +49,11 @@ double log_normal_tail(double a) {
 }
 
 double flux_weighted_normal(double a, Rng& rng) {
+  a = std::clamp(a, -kFarthest, kFarthest);
   if (a <= 0) {
     // Gamma(2)/λ proposal, λ the mode's reciprocal scale; acceptance >= .73. For a -> -inf (-a +
     // √(a²+8))/2 -> -a: no cancellation.
-    const double lambda = (-a + std::sqrt(a * a + 8)) / 2;
+    const double lambda = (-a + std::hypot(a, std::sqrt(8))) / 2;
     for (;;) {
       const double z = -std::log(rng.positive_uniform() * rng.positive_uniform()) / lambda;
       const double r = z - a - lambda;

@@ -136,4 +136,13 @@ TEST(far_tails_have_the_moments_of_many_digits) {
     CHECK(std::abs(truncated.z(1)), <, 4.5);  // 14 tests: 1e-4 together
     CHECK(std::abs(weighted.z(1)), <, 4.5);
   }
+  // Where squares are infinite, and where a mean of that many deviations is itself.
+  for (const double a : {1e9, 1e30, 1e160, 1e300, kInfinity}) {
+    const double beyond = truncated_normal(a, rng), least = std::min(a, 1e300);
+    CHECK(beyond, >, least);
+    CHECK(beyond, <=, least * (1 + 1e-15));
+    CHECK(flux_weighted_normal(-a, rng), >=, 0);
+    CHECK(flux_weighted_normal(-a, rng) * least, <, 50);
+    CHECK(flux_weighted_normal(a, rng), >, 0);
+  }
 }

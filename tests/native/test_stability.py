@@ -3,7 +3,7 @@
 import gpis_native as gn
 import numpy as np
 import pytest
-from stability import anisotropy, conditions, fields, levels, memories, rays, scales, starts, transforms
+from stability import anisotropy, conditions, fields, lengths, levels, memories, rays, scales, starts, transforms
 from stability.verdicts import REFUSED, RIGHT, WRONG, Outcome, few_hits, judge, of_cdf, of_rate, of_sample, within
 from statistics_checks import Z_LIMIT
 
@@ -18,6 +18,7 @@ CELLS = (
     some(scales, 4)
     + some(levels, 37, 3)
     + some(anisotropy, 23)
+    + some(lengths, 17, 5)
     + some(conditions, 7)
     + some(starts, 13)
     + some(memories, 11)
@@ -37,7 +38,7 @@ def test_cell(cell):
 
 def test_keys_are_unique():
     keys = [
-        c.key for f in (scales, levels, anisotropy, conditions, starts, memories, rays, fields, transforms) for c in f.cells()
+        c.key for f in (scales, levels, anisotropy, lengths, conditions, starts, memories, rays, fields, transforms) for c in f.cells()
     ]
     assert len(set(keys)) == len(keys)
 

@@ -136,6 +136,12 @@ def tiny(n):
     return of_cdf((hits["t"] - 0.999) * 10, normal_cdf, "a normal about the plane", [hits])
 
 
+def far_inside(n):
+    """Outside for certain, where the mean is 1e160 deviations inside: the surface is met at once."""
+    hits = hit(process(-1e160, 1.0), n)
+    return within(hits["t"], 0, 1e-5, "the start", [hits])
+
+
 def fast(kernel, sampler):
     return sampler == "auto" and kernel in ("squared exponential", "matern 3/2")
 
@@ -215,6 +221,7 @@ EXACT = {
     "σ falls to 0": sigma_falls_to_zero,
     "μ and σ of 1e149": huge,
     "μ and σ of 1e-151": tiny,
+    "μ of -1e160 σ": far_inside,
 }
 
 

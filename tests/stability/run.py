@@ -24,10 +24,10 @@ sys.path.insert(0, str(TESTS))
 
 import gpis_native as gn  # noqa: E402
 
-from stability import anisotropy, conditions, fields, levels, memories, rays, scales, starts, transforms  # noqa: E402
+from stability import anisotropy, conditions, fields, lengths, levels, memories, rays, scales, starts, transforms  # noqa: E402
 from stability.verdicts import ENDED, WRONG, judge  # noqa: E402
 
-FAMILIES = [scales, levels, anisotropy, conditions, starts, memories, rays, fields, transforms]
+FAMILIES = [scales, levels, anisotropy, lengths, conditions, starts, memories, rays, fields, transforms]
 CPU_SECONDS, MEMORY = 60, 4 << 30
 OUT = ROOT / "out" / "stability"
 
