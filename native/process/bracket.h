@@ -16,8 +16,9 @@ Verdict classify(const P& a, const P& b, double margin) {
   if (a.f < 0 || (a.f == 0 && !(a.df > 0))) return Verdict::none;
   const double h = b.t - a.t, c1 = a.f + h / 3 * a.df, c2 = b.f - h / 3 * b.df;
   if (b.f > 0) return c1 > margin && c2 > margin ? Verdict::none : Verdict::unclear;
-  return c1 < margin && c2 > -margin ? Verdict::unclear
-                                     : Verdict::single;  // Descartes' rule of signs
+  // Descartes' rule of signs. A start that rises less than the margin may be back at once: the
+  // cubic has one root, and a rough path many around it.
+  return c1 < margin && (c2 > -margin || a.df > 0) ? Verdict::unclear : Verdict::single;
 }
 
 // A ray leaves a face that it stands on but for rounding, and a piece of the field ends within that

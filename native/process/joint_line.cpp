@@ -7,6 +7,9 @@ namespace {
 
 // Times the shortest length scale: as far as is looked ahead where no longest one is known.
 constexpr double kLongest = 1e3;
+// Of the points looked at there: how far apart, in length scales, how far, and what their distances
+// grow by from there on.
+constexpr double kBetween = 0.6, kNear = 40, kGrowth = 0.1;
 
 Eigen::Vector4d of(const Functional& f) {
   return {f.value, f.slope.x, f.slope.y, f.slope.z};
@@ -85,14 +88,15 @@ void JointLine::reach(double t, Counters& counters) {
   lost_ = std::max(lost_, rows_.rebase(base_, given, same, kKept, ahead(t)));
 }
 
-// At distances that grow by half, so that no wave meets all of them in the same phase; slopes
-// where they are not but differences of these values.
+// So close that nothing lies between for kNear lengths, then at distances that grow so slowly that
+// no wave meets all of them in the same phase; slopes where they are not but differences of these
+// values.
 std::vector<JointRows::Ahead> JointLine::ahead(double t) const {
   std::vector<JointRows::Ahead> out;
   const double length = covariance_->length_scale(point(t), line_.direction);
   const double end = 4 * std::min(covariance_->longest_length() / gpis::length(line_.direction),
                                   kLongest * length);
-  for (double h = 0; h <= end; h = h == 0 ? 0.3 * length : 1.5 * h) {
+  for (double h = 0; h <= end; h += std::max(kBetween, kGrowth * (h / length - kNear)) * length) {
     const LocalPoint at = point(t + h);
     const LinePoint on_line = rows_.has_line() ? rows_.line().at(t + h, at) : LinePoint{};
     out.push_back({at, on_line, value_row()});

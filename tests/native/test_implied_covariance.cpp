@@ -176,7 +176,7 @@ void check(const GaussianProcess& gp, Sampler sampler, bool from_a_surface,
   const Implied got = implied(gp, sampler, direction, from_a_surface ? &state : nullptr, times);
   const Law expected = law(joint, from_a_surface ? &known : nullptr);
   const double most = 1.05 * got.stated + (from_a_surface ? 1e-6 : 1e-9);
-  CHECK(got.not_linear, <, 1e-6);
+  CHECK(got.not_linear, <, 2e-5);  // rounding, by the weights of rows that all but follow
   CHECK((got.mean - expected.mean).cwiseAbs().maxCoeff() / std::sqrt(variance), <, most);
   CHECK((got.covariance - expected.covariance).cwiseAbs().maxCoeff() / variance, <, most);
   CHECK(got.stated, <, sampler == Sampler::nystrom ? 3e-3 : 1e-3);
