@@ -43,7 +43,7 @@ class JointLine {
  protected:
   // More rows of the line itself than these are not kept in one factor: new ones are then drawn
   // given those kKept that tell most about them.
-  static constexpr int kMostRows = 300, kKept = 200;
+  static constexpr int kMostRows = 340, kKept = 240;
 
   void begin(const Plan& plan, const LineGeometry& line, double anchor, Counters& counters);
   LocalPoint point(double t) const { return covariance_->at(line_.origin + line_.direction * t); }
