@@ -67,7 +67,7 @@ double JointDensePath::error_on(const Plan& plan, const SurveyLine& line) {
   if (std::isinf(path.step_)) return 0;
   std::vector<DensePoints::Interval> intervals;
   double largest = 0;
-  for (double t = 0; t < line.end; t = intervals.back().end) {
+  for (double t = 0; t < line.end && intervals.size() < kMostSurveyed; t = intervals.back().end) {
     intervals.push_back({t, path.where_.after(t)});
     for (const std::size_t back : {0, 1, 2, 3, 5, 8, 13, 21})
       if (back < intervals.size())
@@ -86,7 +86,9 @@ double JointDensePath::lost_on(const Plan& plan, const SurveyLine& line) {
   double g, dg;
   path.reset(plan, line.geometry, 0, line.end, counters);
   path.start_free(rng, counters, g, dg);
-  while (std::isfinite(path.step_) && path.points_.back().t < line.end) path.extend(rng, counters);
+  while (std::isfinite(path.step_) && path.points_.back().t < line.end &&
+         path.points_.size() < kMostSurveyed)
+    path.extend(rng, counters);
   return path.lost();
 }
 

@@ -53,7 +53,7 @@ NystromPath::Plan::Plan(const GaussianProcess& process, const Box3& bounds)
       double g, dg;
       path.reset(*this, line.geometry, 0, line.end, counters);
       path.start_free(rng, counters, g, dg);
-      while (path.nodes_.back().t < line.end) {
+      while (path.nodes_.back().t < line.end && path.nodes_.size() < kMostSurveyed) {
         path.extend(rng, counters);
         const double error = path.error_in(path.intervals_.back());
         correlation_error = std::max(correlation_error, error / covariance.variance());

@@ -34,7 +34,7 @@ std::vector<SurveyLine> survey_lines(const Covariance& covariance, const Box3& b
                         Vec3{1, -1, 1}, Vec3{1, 1, -1}}) {
     const Vec3 direction = normalize(d);
     const double length = scale(middle, direction);
-    lines.push_back(within(box, middle, direction, lengths / 2 * length,
+    lines.push_back(within(bounds, middle, direction, lengths / 2 * length,
                            std::isfinite(length) ? lengths * length : 1));
   }
   if (!covariance.anisotropy()) return lines;
@@ -42,8 +42,12 @@ std::vector<SurveyLine> survey_lines(const Covariance& covariance, const Box3& b
     if (bounds.contains(place))
       for (const Vec3& d : {Vec3{1, 0.1, 0.2}, Vec3{-0.2, 1, 0.1}, Vec3{-0.1, 0.2, 1}}) {
         const Vec3 direction = normalize(d);
-        const double length = std::max(scale(place, direction), scale(middle, direction));
-        lines.push_back(within(box, place, direction, lengths / 2 * length, lengths * length));
+        // Of its own length, and of those around.
+        const double near = scale(place, direction), far = scale(middle, direction);
+        for (const double length : {near, far})
+          if (length == near || far > 3 * near)
+            lines.push_back(
+                within(bounds, place, direction, lengths / 2 * length, lengths * length));
       }
   return lines;
 }

@@ -1,12 +1,16 @@
 // What lines through a process may look like: for what is decided about it before the first ray.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "process/covariance.h"
 #include "process/path.h"
 
 namespace gpis {
+
+// Points of one line that are surveyed at most: where lengths grow a thousandfold it has no end.
+constexpr std::size_t kMostSurveyed = 500;
 
 struct SurveyLine {
   LineGeometry geometry;
