@@ -187,6 +187,8 @@ double JointRows::rebase(const JointRows& base, int given, bool same, int most,
   const std::vector<double> before = std::move(factor_);
   factor_ = base.factor_;
   xi_ = base.xi_;
+  // What is known pulls no less when drawn rows come before it.
+  const double pulled = known_norm2_;
   known_norm2_ = base.known_norm2_;
   for (std::size_t k = 0; k < kept.rows.size(); ++k) {
     const int index = first + kept.rows[k];
@@ -214,6 +216,7 @@ double JointRows::rebase(const JointRows& base, int given, bool same, int most,
     append(row, pivot, (row.value - mean) / std::sqrt(pivot));
     if (has_line_) line_.add_copy(index);
   }
+  known_norm2_ = std::max(pulled, known_norm2_);
   return kept.lost;
 }
 

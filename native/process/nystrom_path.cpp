@@ -58,6 +58,7 @@ NystromPath::Plan::Plan(const GaussianProcess& process, const Box3& bounds)
         const double error = path.error_in(path.intervals_.back());
         correlation_error = std::max(correlation_error, error / covariance.variance());
       }
+      correlation_error = std::max(correlation_error, path.lost());
     }
     if (correlation_error < enough || spacing < 0.3) break;
   }
