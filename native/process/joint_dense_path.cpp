@@ -14,7 +14,7 @@ namespace {
 constexpr double kJitter = 1e-6;
 
 // What is found on the lines surveyed may be exceeded on others: by 1.12 on the most unlike of
-// tests/native/test_implied_covariance.cpp, whose true errors are below half of what is found.
+// tests/native/test_implied_covariance.cpp, whose true errors are below two thirds of it.
 constexpr double kElsewhere = 1.25;
 constexpr double kEnough = 8e-4, kClosest = 0.05;
 // Length scales of a line that forgets.
