@@ -15,6 +15,9 @@ namespace {
 
 constexpr double kMaxReach = 64;
 constexpr int kHalvings = 8;  // of a rough cell
+// Length scales: nearer to what is drawn, a rough path is its cubic, off by 1e-10 standard
+// deviations at most.
+constexpr double kFinest = 1e-8;
 
 // Covariance of (g, g') at two points, q = x - y: rows x, columns y.
 Eigen::Matrix2d block(const Radial& radial, double q) {
@@ -204,8 +207,11 @@ DensePath::Plan::Plan(const GaussianProcess& process, const Box3& bounds)
     // (B₁+B₂)(½) = ¾; 5% for what smaller intervals deviate more, relative to h^power.
     deviation = 4.5 * 1.05 * rest / 0.75 / std::pow(step, power);
     for (int i = 0; i < kHalvings; ++i) halvings.push_back(halving(radial, std::ldexp(step, -i)));
-    const double finest = deviation / 4.5 * std::pow(std::ldexp(step, -kHalvings), power);
-    correlation_error = 2 * finest + (power > 2 ? 2 * hidden_from_halves(radial, step) : 0);
+    // An integrated Brownian motion of intensity q has slopes of variance q h/16 in the middle.
+    const double last = std::ldexp(step, 1 - kHalvings), slope = halvings.back().factor(1, 1);
+    if (power < 2) intensity = 16 * slope * slope / last;
+    const double finest = deviation / 4.5 * std::pow(last / 2, power);
+    correlation_error = power > 2 ? 2 * finest + 2 * hidden_from_halves(radial, step) : 1e-9;
   }
   for (reach = 8; reach < lengths;) reach *= 2;
   factor = DenseFactor::shared(radial, step, static_cast<int>(std::lround(reach / step)) + 2);
@@ -263,26 +269,26 @@ DensePath::Node DensePath::point(long k, Rng& rng, Counters& counters) {
             factor_->row(2 * k + 1).head(used).dot(modes)};
   if (conditioned_) {
     const Radial& radial = plan_->line.radial;
-    const double c = radial.transverse(node.q), slope = -plan_->line.lambda2 * node.q * c;
-    node.g += radial.value(node.q) * delta_value_ + node.q * c * delta_slope_;
-    node.dg += slope * delta_value_ - radial.curvature(node.q) / plan_->line.lambda2 * delta_slope_;
+    const double c = radial.transverse(node.t), slope = -plan_->line.lambda2 * node.t * c;
+    node.g += radial.value(node.t) * delta_value_ + node.t * c * delta_slope_;
+    node.dg += slope * delta_value_ - radial.curvature(node.t) / plan_->line.lambda2 * delta_slope_;
   }
   return node;
 }
 
 void DensePath::prepare(long cell, Rng& rng, Counters& counters) {
   const double left = cell * plan_->step;
-  if (nodes_.back().q < left) nodes_.push_back(point(cell, rng, counters));
-  if (nodes_.back().q < left + plan_->step) nodes_.push_back(point(cell + 1, rng, counters));
+  if (nodes_.back().t < left) nodes_.push_back(point(cell, rng, counters));
+  if (nodes_.back().t < left + plan_->step) nodes_.push_back(point(cell + 1, rng, counters));
 }
 
 void DensePath::at(long cell, double t, Rng& rng, double& g, double& dg) {
   const double q = std::clamp(line_.q(t), cell * plan_->step, (cell + 1) * plan_->step);
   auto right = std::upper_bound(nodes_.begin(), nodes_.end(), q,
-                                [](double x, const Node& node) { return x < node.q; });
-  if ((right - 1)->q == q) return read(*(right - 1), g, dg);
-  // A rough path: halve until the piece that holds q is as short as it gets.
-  for (double width = right->q - (right - 1)->q; !plan_->halvings.empty();) {
+                                [](double x, const Node& node) { return x < node.t; });
+  if ((right - 1)->t == q) return read(*(right - 1), g, dg);
+  // A rough path: halve as far as that is tabulated.
+  for (double width = right->t - (right - 1)->t; !plan_->halvings.empty();) {
     const auto level = static_cast<std::size_t>(std::lround(std::log2(plan_->step / width)));
     if (level >= plan_->halvings.size()) break;
     const Node &a = *(right - 1), &b = *right;
@@ -291,19 +297,21 @@ void DensePath::at(long cell, double t, Rng& rng, double& g, double& dg) {
                               by.factor * Eigen::Vector2d(rng.normal(), rng.normal());
     counters_->line_normals += 2;
     width /= 2;
-    right = nodes_.insert(right, {a.q + width, z[0], z[1]});
-    if (right->q == q) return read(*right, g, dg);
-    if (right->q < q) ++right;
+    right = nodes_.insert(right, {a.t + width, z[0], z[1]});
+    if (right->t == q) return read(*right, g, dg);
+    if (right->t < q) ++right;
   }
-  // Bernstein form of the cubic through both ends.
   const Node &a = *(right - 1), &b = *right;
-  const double h = b.q - a.q, s = (q - a.q) / h, r = 1 - s;
-  const double c1 = a.g + a.dg * h / 3, c2 = b.g - b.dg * h / 3;
-  g = r * r * r * a.g + 3 * r * r * s * c1 + 3 * r * s * s * c2 + s * s * s * b.g;
-  dg = 3 * (r * r * (c1 - a.g) + 2 * r * s * (c2 - c1) + s * s * (b.g - c2)) / h *
-       line_.inverse_length();
+  if (plan_->intensity > 0 && std::min(q - a.t, b.t - q) > kFinest) {
+    const Node node = draw_between(a, b, plan_->intensity, q, rng);
+    counters_->line_normals += 2;
+    nodes_.insert(right, node);
+    return read(node, g, dg);
+  }
+  read(cubic_between(a, b, q), g, dg);
   if (!plan_->halvings.empty()) return;
   // A smooth path is a quintic: s²r²(α r + β s) on top.
+  const double h = b.t - a.t, s = (q - a.t) / h, r = 1 - s;
   const Eigen::Vector2d bend = plan_->bend * Eigen::Vector4d(a.g, a.dg, b.g, b.dg);
   const double top = bend[0] * r + bend[1] * s;
   g += s * s * r * r * top;

@@ -5,15 +5,17 @@
 //  - a smooth path is the quintic through both values and slopes that comes closest to the mean
 //    given them: the spacing is chosen so that this leaves out less than 1e-4 standard deviations;
 //  - a rough path (Matérn, Wong) is halved by its exact law given value and slope at both ends,
-//  down
-//    to 1/256 of a cell, and cubic below. For Matérn 3/2 and Wong that law is the whole truth;
-//    Matérn 5/2 also knows g'' (its effect on the correlation is below the variance of the bridge).
+//    down to 1/256 of a cell. For Matérn 3/2 and Wong that law is the whole truth, and below the
+//    path is the bridge of an integrated Brownian motion, drawn where it is asked for; Matérn 5/2
+//    also knows g'' (its effect on the correlation is below the variance of the bridge) and is
+//    cubic below.
 #pragma once
 
 #include <Eigen/Core>
 #include <memory>
 #include <vector>
 
+#include "process/brownian_bridge.h"
 #include "process/gaussian_process.h"
 #include "process/radial_line.h"
 
@@ -26,7 +28,7 @@ class DenseFactor;
 class DensePath {
  public:
   static constexpr int kStride = 1;
-  static constexpr double kLastStep = 1e-5;
+  static constexpr double kLastStep = 0;
   struct Plan {
     Plan(const GaussianProcess& process, const Box3& bounds);
 
@@ -43,6 +45,7 @@ class DensePath {
     // Of a smooth path: what the quintic adds to the cubic, from both ends.
     Eigen::Matrix<double, 2, 4> bend = Eigen::Matrix<double, 2, 4>::Zero();
     std::vector<Halving> halvings;  // of a rough path: of a cell, of half a cell, …
+    double intensity = 0;           // below these, of the noise that drives the slope
     std::shared_ptr<DenseFactor> factor;
   };
 
@@ -70,9 +73,7 @@ class DensePath {
   PathGradient gradient(double t, double, double dg, Rng&) const { return line_.gradient(t, dg); }
 
  private:
-  struct Node {  // slope per length scale
-    double q, g, dg;
-  };
+  using Node = BridgePoint;  // in length scales
   Node point(long k, Rng& rng, Counters& counters);
   void read(const Node& node, double& g, double& dg) const {
     g = node.g;

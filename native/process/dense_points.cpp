@@ -147,17 +147,17 @@ double DensePoints::after(double t) const {
 
 // What is rough about the covariance of Paciorek and Schervish is that of the kernel at the
 // distance dᵀA⁻¹d.
-double DensePoints::slope_intensity(double a, double b) const {
+double DensePoints::slope_intensity(double t) const {
   if (!lengths_) return intensity_;
   if (!(spacing_.roughness > 0)) return 0;
-  const double length = lengths_->plain_length_scale(lengths_->at(0.5 * (a + b))) *
-                        std::sqrt(covariance_->shortest_inverse2());
+  const double length =
+      lengths_->plain_length_scale(lengths_->at(t)) * std::sqrt(covariance_->shortest_inverse2());
   return spacing_.roughness / (length * length * length);
 }
 
 double DensePoints::error_of_cubics(const Interval& a, const Interval& b) const {
   const double h = a.end - a.begin, k = b.end - b.begin;
-  const double intensity = a.begin == b.begin ? slope_intensity(a.begin, a.end) : 0;
+  const double intensity = a.begin == b.begin ? slope_intensity(a.begin + 0.5 * h) : 0;
   double largest = 0;
   for (const double s : kQuarters) {
     const auto here = error_of_cubic(*covariance_, line_, a.begin, h, s);

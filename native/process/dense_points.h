@@ -26,8 +26,8 @@ class DensePoints {
              const Spacing& spacing, double anchor, double step);
   // The point behind one at t.
   double after(double t) const;
-  // That q in the middle of [a, b].
-  double slope_intensity(double a, double b) const;
+  // That q at t.
+  double slope_intensity(double t) const;
   // |implied - exact correlation| that the cubics over two intervals, the same or the second behind
   // the first, make between points within them; with what bridges add to a rough path.
   struct Interval {

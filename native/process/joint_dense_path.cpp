@@ -20,17 +20,9 @@ constexpr double kEnough = 8e-4, kClosest = 0.05;
 // Length scales of a line that forgets.
 constexpr double kFar = 40;
 
-// Through (a, da) at `begin` and (b, db) at `end`, in Bernstein's form.
-void cubic(double begin, double a, double da, double end, double b, double db, double t, double& g,
-           double& dg) {
-  const double h = end - begin, s = (t - begin) / h, r = 1 - s;
-  const double c1 = a + da * h / 3, c2 = b - db * h / 3;
-  g = r * r * r * a + 3 * r * r * s * c1 + 3 * r * s * s * c2 + s * s * s * b;
-  dg = 3 * (r * r * (c1 - a) + 2 * r * s * (c2 - c1) + s * s * (b - c2)) / h;
-}
-
-// Of an interval, of which the rest is a cubic.
-constexpr int kHalvings = 8;
+// Of the way between two points: nearer to what is drawn, rests are the cubic around, off by 1e-10
+// standard deviations at most.
+constexpr double kFinest = 1e-7;
 
 // How far off its cubic, in units of (B₁ + B₂), a path between points may be, for 4.5 standard
 // deviations of a bridge: as DensePath's, (B₁+B₂)(½) = ¾, and 5 % for shorter intervals.
@@ -133,7 +125,8 @@ void JointDensePath::draw(double t, Rng& rng, Counters& counters) {
 void JointDensePath::extend(Rng& rng, Counters& counters) {
   const double t = points_.back().t;
   draw(where_.after(t), rng, counters);
-  points_[points_.size() - 2].intensity = where_.slope_intensity(t, points_.back().t);
+  points_[points_.size() - 2].intensity =
+      std::max(where_.slope_intensity(t), where_.slope_intensity(points_.back().t));
 }
 
 void JointDensePath::prepare(long cell, Rng& rng, Counters& counters) {
@@ -141,7 +134,7 @@ void JointDensePath::prepare(long cell, Rng& rng, Counters& counters) {
   // A stretch was skipped: goes on here, given all before it.
   if (points_.back().t < cell_end(cell - 1)) draw(cell_end(cell - 1), rng, counters);
   while (points_.back().t < cell_end(cell)) extend(rng, counters);
-  draw_rests(cell_end(cell), rng);
+  draw_rest(cell_end(cell), rng);
 }
 
 std::size_t JointDensePath::before(double t) const {
@@ -150,36 +143,28 @@ std::size_t JointDensePath::before(double t) const {
   return i;
 }
 
-std::array<JointDensePath::Rest, 2> JointDensePath::rests_around(std::size_t piece,
-                                                                 double t) const {
-  std::array<Rest, 2> around{Rest{points_[piece].t, 0, 0}, Rest{points_[piece + 1].t, 0, 0}};
-  const auto right = std::upper_bound(rests_.begin(), rests_.end(), t,
-                                      [](double x, const Rest& rest) { return x < rest.t; });
+std::vector<BridgePoint>::const_iterator JointDensePath::rest_behind(double t) const {
+  return std::upper_bound(rests_.begin(), rests_.end(), t,
+                          [](double x, const BridgePoint& rest) { return x < rest.t; });
+}
+
+std::array<BridgePoint, 2> JointDensePath::rests_around(std::size_t piece, double t) const {
+  std::array<BridgePoint, 2> around{BridgePoint{points_[piece].t, 0, 0},
+                                    BridgePoint{points_[piece + 1].t, 0, 0}};
+  const auto right = rest_behind(t);
   if (right != rests_.begin() && (right - 1)->t > around[0].t) around[0] = *(right - 1);
   if (right != rests_.end() && right->t < around[1].t) around[1] = *right;
   return around;
 }
 
-// An integrated Brownian motion given value and slope at both ends of an interval: the value of its
-// middle has the variance q h³/192, the slope there q h/16, and neither knows of the other.
-void JointDensePath::draw_rests(double t, Rng& rng) {
+void JointDensePath::draw_rest(double t, Rng& rng) {
   const std::size_t piece = before(t);
-  const double intensity = points_[piece].intensity;
-  if (!(intensity > 0) || t == points_[piece].t || piece + 1 == points_.size()) return;
-  const double shortest = 1.5 * std::ldexp(points_[piece + 1].t - points_[piece].t, -kHalvings);
-  auto [a, b] = rests_around(piece, t);
-  for (double h = b.t - a.t; a.t < t && h > shortest; h = b.t - a.t) {
-    const Rest middle{
-        a.t + h / 2,
-        (a.g + b.g) / 2 + h * (a.dg - b.dg) / 8 +
-            std::sqrt(intensity * h * h * h / 192) * rng.normal(),
-        1.5 * (b.g - a.g) / h - (a.dg + b.dg) / 4 + std::sqrt(intensity * h / 16) * rng.normal()};
-    counters_->line_normals += 2;
-    rests_.insert(std::upper_bound(rests_.begin(), rests_.end(), middle.t,
-                                   [](double x, const Rest& rest) { return x < rest.t; }),
-                  middle);
-    (middle.t <= t ? a : b) = middle;
-  }
+  if (!(points_[piece].intensity > 0) || piece + 1 == points_.size()) return;
+  const double finest = kFinest * (points_[piece + 1].t - points_[piece].t);
+  const auto [a, b] = rests_around(piece, t);
+  if (!(std::min(t - a.t, b.t - t) > finest)) return;
+  counters_->line_normals += 2;
+  rests_.insert(rest_behind(t), draw_between(a, b, where_.slope_intensity(t), t, rng));
 }
 
 void JointDensePath::read(double t, double& g, double& dg) const {
@@ -189,13 +174,14 @@ void JointDensePath::read(double t, double& g, double& dg) const {
   dg = a.dg;
   if (t == a.t || piece + 1 == points_.size()) return;
   const Point& b = points_[piece + 1];
-  cubic(a.t, a.g, a.dg, b.t, b.g, b.dg, t, g, dg);
+  const BridgePoint middle = cubic_between({a.t, a.g, a.dg}, {b.t, b.g, b.dg}, t);
+  g = middle.g;
+  dg = middle.dg;
   if (!(a.intensity > 0)) return;
   const auto [left, right] = rests_around(piece, t);
-  double rest, slope;
-  cubic(left.t, left.g, left.dg, right.t, right.g, right.dg, t, rest, slope);
-  g += rest;
-  dg += slope;
+  const BridgePoint rest = cubic_between(left, right, t);
+  g += rest.g;
+  dg += rest.dg;
 }
 
 void JointDensePath::at_right(long cell, double& g, double& dg) const {
@@ -208,7 +194,7 @@ void JointDensePath::at_right(long cell, double& g, double& dg) const {
 }
 
 void JointDensePath::at(long, double t, Rng& rng, double& g, double& dg) {
-  draw_rests(t, rng);
+  draw_rest(t, rng);
   read(t, g, dg);
 }
 
@@ -229,9 +215,8 @@ double JointDensePath::deviation_over_points(std::size_t piece, double a, double
   read(end.t, end.g, end.dg);
   const Point begin = left;
   const auto off = [&](const Point& p) {
-    double g, dg;
-    cubic(a, begin.g, begin.dg, end.t, end.g, end.dg, p.t, g, dg);
-    return std::array{p.g - g, p.dg - dg};
+    const BridgePoint c = cubic_between({a, begin.g, begin.dg}, {end.t, end.g, end.dg}, p.t);
+    return std::array{p.g - c.g, p.dg - c.dg};
   };
   double largest = 0;
   for (std::array<double, 2> e0{0, 0}; left.t < end.t; ++piece) {

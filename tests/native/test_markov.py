@@ -60,16 +60,6 @@ def test_survival_of_wong(sampler, start, memory, survival, n, full_size, seed, 
     assert off < 1e-3 or not full_size
 
 
-@pytest.mark.parametrize("slope", [0.1, 1e-2, 1e-3])
-def test_slow_starts_of_wong(slope, n, seed):
-    """Oracle 5, from slopes 2b of a tenth of a deviation to a thousandth: half of all rays are back within b² length scales,
-    and a step that begins so slowly and ends inside holds many roots around that of its cubic."""
-    w, returned = np.array([1, 4, 16, 100]), [0.0433436, 0.2211788, 0.4268455, 0.6334653]  # by quadrature
-    t = np.sqrt(3) / 2 * np.log1p(w * slope**2 / 4)
-    hits = gn.first_hits(process("wong"), *along_x(n), 6, start=on_surface(n, (slope, 0, 0)), sampler="markov", seed=seed)
-    check_proportion(np.sum(hits["t"][:, None] < t, axis=0), n, returned, 1e-5, f"slope {slope}")
-
-
 @pytest.mark.parametrize("sampler", ["markov", "dense"])
 def test_slope_of_wong_at_its_first_return(sampler, n, seed):
     """Oracle 5: joint density of u = e^{2t/√3} - 1 and h, slope at the hit 2h/√(1+u), from slope v = 2b = 1."""
