@@ -89,6 +89,8 @@ void NystromPath::reset(const Plan& plan, const LineGeometry& line, double ancho
   t_end_ = t_end;
   step_ = (varies() ? plan_->spacing : 0.5) * near_length(t_end);
   margin_ = -1;
+  near_.forget();
+  start_known_ = false;
   enter(anchor, anchor);
 }
 
@@ -119,6 +121,7 @@ void NystromPath::start_free(Rng& rng, Counters& counters, double& g, double& dg
 double NystromPath::start(const PathStart& known, Rng& rng, Counters& counters) {
   const double slope = JointLine::start(known, rng, counters);
   begin_at_anchor(known.value, slope);
+  start_known_ = true;
   return slope;
 }
 
@@ -170,6 +173,8 @@ void NystromPath::extend(Rng& rng, Counters& counters) {
   Node next = after(nodes_.back());
   // At infinity where g is constant along the line.
   if (std::isfinite(next.t)) draw(next, rng, counters);
+  if (start_known_ && nodes_.size() == 1 && std::isfinite(next.t))
+    near_.know(anchor_, nodes_[0].g, nodes_[0].dg, kNear * (next.t - anchor_));
   intervals_.push_back({nodes_.back().t, next.t});
   nodes_.push_back(next);
 }
@@ -203,6 +208,11 @@ void NystromPath::evaluate(double t, double& g, double& dg) {
       dg = nodes_[i].dg;
       return;
     }
+  const auto mean = [this](double at, double& v, double& dv) { mean_at(at, v, dv); };
+  near_.holds(t) ? near_.read(t, g, dg, mean) : mean(t, g, dg);
+}
+
+void NystromPath::mean_at(double t, double& g, double& dg) {
   std::size_t i = intervals_.size() - 1;
   while (i > 0 && t < intervals_[i].begin) --i;
   const JointRows::Mean& of = mean(intervals_[i]);

@@ -6,6 +6,7 @@
 #pragma once
 
 #include "process/joint_line.h"
+#include "process/near_start.h"
 
 namespace gpis {
 
@@ -38,6 +39,7 @@ class NystromPath : public JointLine {
 
  private:
   static constexpr double kSliver = 1e-6;
+  static constexpr double kNear = 1e-3;  // of the way to the first node
   static constexpr int kMostHalvings = 5;
   static constexpr int kLater = 6;  // points behind the last node that error_in looks at
 
@@ -60,6 +62,7 @@ class NystromPath : public JointLine {
   void draw(Node& node, Rng& rng, Counters& counters);
   const JointRows::Mean& mean(Interval& interval);
   void evaluate(double t, double& g, double& dg);
+  void mean_at(double t, double& g, double& dg);
   bool varies() const { return rows_.has_line(); }
 
   const Plan* plan_ = nullptr;
@@ -67,6 +70,8 @@ class NystromPath : public JointLine {
   std::vector<Node> nodes_;
   std::vector<Interval> intervals_;
   std::vector<JointRows::Mean> means_;
+  NearStart near_;
+  bool start_known_ = false;
   double margin_ = 0;  // of the cell prepared last, see deviation
   double piece_begin_ = 0, piece_end_ = 0;
 };

@@ -7,6 +7,8 @@
 namespace gpis {
 namespace {
 
+constexpr double kNear = 0.01;  // see near_start_reach: lattices have steps of 1e-7
+
 // Of a symmetric matrix that is singular where the kernel is constant along an axis, or conditions
 // leave no freedom.
 Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& matrix) {
@@ -43,6 +45,7 @@ void RealisationPath::reset(const Plan& plan, const LineGeometry& line, double a
   line_ = line;
   anchor_ = anchor;
   drawn_ = false;
+  near_.forget();
   pull_ = plan.pull();
   entry_ = own_ = {};
   sign_ = kept_sign_;
@@ -132,6 +135,7 @@ double RealisationPath::start(const PathStart& known, Rng& rng, Counters& counte
   }
   double mean, deviation;
   slope_law(known.value, mean, deviation);
+  near_.know(anchor_, known.value, dg, near_start_reach(kNear, deviation, deviation_));
   pull_ = plan_->pull() + std::max(0.0, -known.value) +
           (deviation > 0
                ? 0.61 * std::max(0.0, -dg) * std::sqrt(plan_->covariance->variance()) / deviation
@@ -177,6 +181,11 @@ FieldSample RealisationPath::sample(const Vec3& x) const {
 }
 
 void RealisationPath::evaluate(double t, double& g, double& dg) {
+  const auto field = [this](double at, double& v, double& dv) { realised(at, v, dv); };
+  near_.holds(t) ? near_.read(t, g, dg, field) : field(t, g, dg);
+}
+
+void RealisationPath::realised(double t, double& g, double& dg) {
   realisation_->on_line(t, g, dg);
   FieldSample moved;
   entry_.add(*plan_->covariance, plan_->posterior.get(), point(t), moved);

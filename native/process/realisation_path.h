@@ -4,6 +4,7 @@
 #pragma once
 
 #include "process/gaussian_process.h"
+#include "process/near_start.h"
 #include "process/path.h"
 #include "process/realisation.h"
 #include "process/realisation_memory.h"
@@ -59,6 +60,7 @@ class RealisationPath {
   void count(Counters& counters);
   RealisationCondition condition(const PathStart& known) const;
   void evaluate(double t, double& g, double& dg);
+  void realised(double t, double& g, double& dg);
   Vec3 point(double t) const { return line_.origin + line_.direction * t; }
 
   const Plan* plan_ = nullptr;
@@ -68,6 +70,7 @@ class RealisationPath {
   double kept_sign_ = 1, sign_ = 1;  // of the next line, and of this one
   LineGeometry line_;
   double anchor_ = 0, step_ = 1, deviation_ = 0, pull_ = 0, added_norm_ = 0;
+  NearStart near_;
   bool drawn_ = false;
   bool met_before_ = false;
   std::uint64_t counted_ = 0;

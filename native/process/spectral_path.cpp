@@ -11,6 +11,7 @@ namespace {
 // What a path departs from its cubic over a cell, in standard deviations of g: where the squared
 // exponential's steps of half a length scale stand.
 constexpr double kCellDeviation = 0.01;
+constexpr double kNear = 1e-3;  // see near_start_reach
 
 // The largest |κ'| at distances of at least q.
 double steepest(const Radial& radial, double q) {
@@ -31,6 +32,7 @@ void SpectralPath::reset(const Plan& plan, const LineGeometry& line, double anch
   next_pull_ = 0;
   pull_ = 0;
   drawn_ = remembered_ = held_ = false;
+  near_.forget();
   terms_.clear();
   for (const Plan::Component& c : plan.components)
     place(c, line.direction, t_end - anchor, counters);
@@ -196,7 +198,13 @@ double SpectralPath::start(const PathStart& known, Rng& rng, Counters& counters)
   shift(value, correction);
   hold(known.value / plan_->variance, mean);
   right_g_ = value_.sum();
-  return right_dg_ = (rate_ * slope_).sum();
+  right_dg_ = (rate_ * slope_).sum();
+  const double slope = std::sqrt(slope_variance_);
+  // Unless the kernel cannot have it.
+  if (known.slope_known && std::abs(known.slope - right_dg_) < 1e-6 * (slope + std::abs(right_dg_)))
+    right_dg_ = known.slope;
+  near_.know(anchor_, known.value, right_dg_, near_start_reach(kNear, slope, deviation_));
+  return right_dg_;
 }
 
 // What the conditional mean Σ w [κ (v cos θ + (k·c) sin θ) - κ' (E·c) cos θ] can be, term by term.
@@ -258,6 +266,11 @@ void SpectralPath::at_right(long cell, double& g, double& dg) {
 }
 
 void SpectralPath::evaluate(double t, double& g, double& dg) {
+  const auto waves = [this](double at, double& v, double& dv) { sum_waves(at, v, dv); };
+  near_.holds(t) ? near_.read(t, g, dg, waves) : waves(t, g, dg);
+}
+
+void SpectralPath::sum_waves(double t, double& g, double& dg) {
   turn_by(t - state_t_, turned_cos_, turned_sin_);
   g = (value_ * turned_cos_ + slope_ * turned_sin_).sum();
   dg = (rate_ * (slope_ * turned_cos_ - value_ * turned_sin_)).sum();

@@ -13,6 +13,7 @@
 
 #include "process/gaussian_process.h"
 #include "process/line_spectrum.h"
+#include "process/near_start.h"
 #include "process/path.h"
 
 namespace gpis {
@@ -96,6 +97,7 @@ class SpectralPath {
   void hold(double value, const Vec3& gradient);
   double pull_from(double tau) const;
   void evaluate(double t, double& g, double& dg);
+  void sum_waves(double t, double& g, double& dg);
   // cos and sin of what every wave turns by in `tau`.
   void turn_by(double tau, Array& cosine, Array& sine);
   // Gradient of g at the waves' own state `slope` (B cos - A sin), without what is across.
@@ -113,6 +115,7 @@ class SpectralPath {
   double state_t_ = 0;  // the right end of cell_
   long cell_ = -1, next_pull_ = 0;
   double right_g_ = 0, right_dg_ = 0;
+  NearStart near_;
   bool drawn_ = false, remembered_ = false, held_ = false;
   double pull_ = 0;
 };
