@@ -1,5 +1,6 @@
 #include "process/dense_points.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <span>
@@ -14,6 +15,8 @@ constexpr double kAlike = 1.3;     // lengths at both ends of an interval
 constexpr double kFew = 0.4;
 // Of a length scale; and a share of the variance that a cubic over it may miss.
 constexpr double kShort = 0.1, kSmoothest = 1e-9;
+// Of the variance behind a known start; and the least share of an interval for the first.
+constexpr double kOffBehindStart = 0.01, kLeastShare = 1.0 / 16;
 constexpr double kQuarters[] = {0.25, 0.5, 0.75};
 
 // One of a sum of values and slopes of g.
@@ -75,15 +78,52 @@ double bridged(double h, double s, double u) {
   return h * h * h * s * s * (1 - u) * (1 - u) * (3 * u - s - 2 * s * u) / 6;
 }
 
+// How far off the variance of g is close to a known start, by the cubic to h and, of a rough path,
+// by the bridge on top of it; relative.
+double off_behind_start(const Covariance& covariance, const Vec3& d, double h) {
+  const LineGeometry line{{}, d};
+  const double s = 0.125, r = 1 - s;
+  const LocalPoint start = covariance.at({}), there = covariance.at(d * h),
+                   near = covariance.at(d * (s * h));
+  const Part rows[] = {{start, {}}, {start, {0, d}}, {near, {}}, {there, {}}, {there, {0, d}}};
+  Eigen::Matrix<double, 5, 5> k;
+  for (int i = 0; i < 5; ++i)
+    for (int j = 0; j < 5; ++j)
+      k(i, j) = covariance.between(rows[i].at, rows[i].what, rows[j].at, rows[j].what);
+  const Eigen::Matrix3d given =
+      k.bottomRightCorner<3, 3>() -
+      k.bottomLeftCorner<3, 2>() * k.topLeftCorner<2, 2>().ldlt().solve(k.topRightCorner<2, 3>());
+  const Eigen::Vector2d weights{s * s * (1 + 2 * r), -s * s * r * h};
+  const double bridge = intensity_from(covariance, line, h) * bridged(h, s, s);
+  const double implied = weights.dot(given.bottomRightCorner<2, 2>() * weights) + bridge;
+  return given(0, 0) > 0 ? std::abs(implied / given(0, 0) - 1) : 0;
+}
+
+Covariance unvaried(const GaussianProcess& process) {
+  GaussianProcess out = process;
+  out.anisotropy = nullptr;
+  return Covariance(out);
+}
+
 }  // namespace
 
 double DensePoints::roughness_under(const GaussianProcess& process) {
   if (!process.anisotropy) return 0;
-  GaussianProcess unvaried = process;
-  unvaried.anisotropy = nullptr;
-  const Covariance covariance(unvaried);
+  const Covariance covariance = unvaried(process);
   return intensity_from(covariance, {{}, {1, 0, 0}},
                         kShort / std::sqrt(Covariance(process).shortest_inverse2()));
+}
+
+double DensePoints::first_under(const GaussianProcess& process, double lengths) {
+  const Covariance covariance = unvaried(process);
+  double share = 1;
+  for (const Vec3& d : {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}}) {
+    const double length = covariance.length_scale(covariance.at({}), d);
+    while (std::isfinite(length) && share > kLeastShare &&
+           off_behind_start(covariance, d, share * lengths * length) > kOffBehindStart)
+      share /= 2;
+  }
+  return share;
 }
 
 void DensePoints::reset(const Covariance& covariance, const LineGeometry& line,
@@ -95,6 +135,7 @@ void DensePoints::reset(const Covariance& covariance, const LineGeometry& line,
   spacing_ = spacing;
   anchor_ = anchor;
   step_ = step;
+  first_ = 0;
   intensity_ =
       lengths || covariance.smooth() || std::isinf(step)
           ? 0
@@ -116,10 +157,15 @@ double DensePoints::farther(double t, double length) const {
   return parts > 1 ? t + (whole - t) / parts : whole;
 }
 
+double DensePoints::after(double t) const {
+  const double next = regular(t);
+  return first_ > 0 ? std::min(next, t + std::max(first_, t - anchor_)) : next;
+}
+
 // As far as the lengths at both ends allow (half as far until the next one does: what is short may
 // be in that one place) and the kinks of A between them, and no farther than a cubic goes.
-double DensePoints::after(double t) const {
-  if (!lengths_) return anchor_ + (std::round((t - anchor_) / step_) + 1) * step_;
+double DensePoints::regular(double t) const {
+  if (!lengths_) return anchor_ + (std::floor((t - anchor_) / step_ + 1e-6) + 1) * step_;
   const double here = length_at(t);
   double next = farther(t, here);
   double there = length_at(next);

@@ -12,6 +12,8 @@ namespace {
 // and rounding made covariances of 1e3 σ² out of them over 7 length scales (leaving such rows out
 // costs 1e-3 where it is stable). The correlation is off by this much, the path stays a cubic.
 constexpr double kJitter = 1e-6;
+// Of the little that a known start leaves of rows close to it.
+constexpr double kBehindStart = 1e-3;
 
 // What is found on the lines surveyed may be exceeded on others: by 1.12 on the most unlike of
 // tests/native/test_implied_covariance.cpp, whose true errors are below two thirds of it.
@@ -36,6 +38,7 @@ JointDensePath::Plan::Plan(const GaussianProcess& process, const Box3& bounds)
     : JointLine::Plan(process),
       spacing{covariance.smooth() ? 0.25 : 0.15, 0.04, 5e-4,
               DensePoints::roughness_under(process)} {
+  spacing.first = DensePoints::first_under(process, spacing.lengths);
   const std::vector<SurveyLine> lines = survey_lines(covariance, bounds);
   // Closer points until the cubics are good enough for lengths that vary.
   for (;; spacing.lengths *= 0.8, spacing.kinks *= 0.5, spacing.missed *= 0.5) {
@@ -102,6 +105,7 @@ void JointDensePath::start_free(Rng& rng, Counters& counters, double& g, double&
 double JointDensePath::start(const PathStart& known, Rng& rng, Counters& counters) {
   const double slope = JointLine::start(known, rng, counters);
   points_.assign(1, {anchor_, known.value, slope});
+  where_.start_known();
   return slope;
 }
 
@@ -118,8 +122,10 @@ void JointDensePath::draw(double t, Rng& rng, Counters& counters) {
   } else {
     p = point(t);
   }
-  const double g = rows_.add_free(p, value_row(), rng, counters, kJitter, on_line);
-  points_.push_back({t, g, rows_.add_free(p, slope_row(), rng, counters, kJitter, on_line)});
+  const double of_left = where_.grows(t) ? kBehindStart : kInfinity;
+  const double g = rows_.add_free(p, value_row(), rng, counters, kJitter, on_line, of_left);
+  points_.push_back(
+      {t, g, rows_.add_free(p, slope_row(), rng, counters, kJitter, on_line, of_left)});
 }
 
 void JointDensePath::extend(Rng& rng, Counters& counters) {

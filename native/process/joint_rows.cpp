@@ -100,18 +100,20 @@ JointRows::Known JointRows::add_known(const LocalPoint& at, const Functional& wh
 }
 
 double JointRows::add_free(const LocalPoint& at, const Functional& what, Rng& rng,
-                           Counters& counters, double jitter, const LinePoint* on_line) {
-  const double variance = (1 + jitter) * own(at, what, on_line);
+                           Counters& counters, double jitter, const LinePoint* on_line,
+                           double of_left) {
+  const double variance = own(at, what, on_line);
   double mean;
-  const double pivot = border(at, what, variance, mean, on_line);
+  const double left = border(at, what, variance, mean, on_line);
+  const double noise = jitter > 0 ? std::min(jitter * variance, of_left * std::max(0.0, left)) : 0;
+  const double pivot = left + noise;
   if (!(pivot > (jitter > 0 ? kPivot : kDrawnPivot) * variance)) {
     ++counters.pivots_dropped;
     return mean;
   }
   const double xi = rng.normal(), value = mean + std::sqrt(pivot) * xi;
   ++counters.line_normals;
-  append({at, what, value, variance * jitter / (1 + jitter), false, false, on_line != nullptr},
-         pivot, xi);
+  append({at, what, value, noise, false, false, on_line != nullptr}, pivot, xi);
   if (has_line_) line_.add(on_line, at, what);
   return value;
 }

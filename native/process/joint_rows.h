@@ -47,9 +47,10 @@ class JointRows {
   Known add_known(const LocalPoint& at, const Functional& what, double value, double noise,
                   Counters& counters, const LinePoint* on_line = nullptr);
   // A functional drawn given the rows before it, with independent noise of `jitter` times its own
-  // variance; its value.
+  // variance, at most `of_left` times what the rows before leave of that; its value.
   double add_free(const LocalPoint& at, const Functional& what, Rng& rng, Counters& counters,
-                  double jitter = 0, const LinePoint* on_line = nullptr);
+                  double jitter = 0, const LinePoint* on_line = nullptr,
+                  double of_left = kInfinity);
   // From now on rows are drawn given those of `base` and at most `most` of the active rows alone:
   // those that tell most about what lies `ahead`. The largest correlation with any of that which
   // the others still have, given what is kept. The first `given` of the active rows are those of a

@@ -130,20 +130,21 @@ double NystromPath::start(const PathStart& known, Rng& rng, Counters& counters) 
 // lengths may be short between two places where they are long. Where lengths vary,
 // at the ends of cells if these are no farther apart: what is known at a node serves the march too.
 NystromPath::Node NystromPath::after(const Node& last) const {
+  const double spacing = plan_->spacing * (start_known_ && last.t == anchor_ ? kFirst : 1);
   const auto farther = [&](double length) {
-    const double t = last.t + plan_->spacing * length;
+    const double t = last.t + spacing * length;
     if (!varies() || t - last.t < (1 - 1e-9) * step_) return t;
     return anchor_ + std::floor((t - anchor_) / step_ + 1e-6) * step_;
   };
   Node next = node(farther(last.length_scale));
-  while (next.t - last.t > (1 + 1e-6) * plan_->spacing * next.length_scale)
+  while (next.t - last.t > (1 + 1e-6) * spacing * next.length_scale)
     next = node(last.t + 0.5 * (next.t - last.t));
   if (!varies()) return next;
   for (int i = 0; i < kMostHalvings; ++i) {
     const double h = next.t - last.t;
     const double kinks = covariance_->anisotropy()->kinks(
         line_.origin, line_.direction, last.t + kSliver * h, next.t - kSliver * h);
-    if (kinks * h <= plan_->spacing) break;
+    if (kinks * h <= spacing) break;
     next = node(last.t + 0.5 * h);
   }
   return next;
