@@ -15,6 +15,14 @@ double Term::max_inverse_length() const {
   return longest;
 }
 
+std::optional<std::vector<ProductTerm>> Kernel::products() const {
+  const auto terms = this->terms();
+  if (!terms) return std::nullopt;
+  std::vector<ProductTerm> out;
+  for (const Term& term : *terms) out.push_back({term.weight, {term}});
+  return out;
+}
+
 double Kernel::derivative_variance(const Vec3& direction) const {
   if (!differentiable()) return kInfinity;
   // A quadratic form of a positive semi-definite matrix: below 0 by rounding alone.

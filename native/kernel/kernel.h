@@ -26,6 +26,13 @@ struct Term {
   double max_inverse_length() const;
 };
 
+// weight · Π κᵢ(|Bᵢ r|) cos(kᵢ·r): a term whose radial part is a product of several. The weights of
+// the factors do not count.
+struct ProductTerm {
+  double weight = 1;
+  std::vector<Term> factors;
+};
+
 class Kernel {
  public:
   // A normal form longer than this is not made: whoever needs one serves the kernel jointly.
@@ -47,6 +54,9 @@ class Kernel {
   virtual double min_length_scale() const = 0;
   // The normal form: g as a sum of independent terms; nothing where a product has none.
   virtual std::optional<std::vector<Term>> terms() const = 0;
+  // The same for products too, for those who need no more than to draw from its spectrum; nothing
+  // where there are more than kMaxTerms.
+  virtual std::optional<std::vector<ProductTerm>> products() const;
   // As Python writes it.
   virtual std::string describe() const = 0;
 

@@ -24,6 +24,7 @@ class ProductKernel : public Kernel {
   // Squared exponentials multiply to one with the sum of the A⁻¹, cosines to a half of each of two
   // cosines, a constant to the other factor; what else there is has no normal form.
   std::optional<std::vector<Term>> terms() const override;
+  std::optional<std::vector<ProductTerm>> products() const override;
   std::string describe() const override { return a_->describe() + " * " + b_->describe(); }
 
  private:

@@ -18,17 +18,22 @@ class ScaledKernel : public Kernel {
   Mat3 mixed(const Vec3& r) const override { return kernel_->mixed(r) * weight_; }
   bool differentiable() const override { return kernel_->differentiable(); }
   double min_length_scale() const override { return kernel_->min_length_scale(); }
-  std::optional<std::vector<Term>> terms() const override {
-    auto terms = kernel_->terms();
-    if (terms)
-      for (Term& term : *terms) term.weight *= weight_;
-    return terms;
+  std::optional<std::vector<Term>> terms() const override { return scaled(kernel_->terms()); }
+  std::optional<std::vector<ProductTerm>> products() const override {
+    return scaled(kernel_->products());
   }
   std::string describe() const override {
     return number_text(weight_) + " * " + kernel_->describe();
   }
 
  private:
+  template <class T>
+  std::optional<std::vector<T>> scaled(std::optional<std::vector<T>> terms) const {
+    if (terms)
+      for (T& term : *terms) term.weight *= weight_;
+    return terms;
+  }
+
   double weight_;
   KernelPtr kernel_;
 };

@@ -20,17 +20,24 @@ class SumKernel : public Kernel {
     return std::min(a_->min_length_scale(), b_->min_length_scale());
   }
   std::optional<std::vector<Term>> terms() const override {
-    auto terms = a_->terms();
-    const auto more = b_->terms();
-    if (!terms || !more || terms->size() + more->size() > kMaxTerms) return std::nullopt;
-    terms->insert(terms->end(), more->begin(), more->end());
-    return terms;
+    return joined(a_->terms(), b_->terms());
+  }
+  std::optional<std::vector<ProductTerm>> products() const override {
+    return joined(a_->products(), b_->products());
   }
   std::string describe() const override {
     return "(" + a_->describe() + " + " + b_->describe() + ")";
   }
 
  private:
+  template <class T>
+  static std::optional<std::vector<T>> joined(std::optional<std::vector<T>> terms,
+                                              const std::optional<std::vector<T>>& more) {
+    if (!terms || !more || terms->size() + more->size() > kMaxTerms) return std::nullopt;
+    terms->insert(terms->end(), more->begin(), more->end());
+    return terms;
+  }
+
   KernelPtr a_, b_;
 };
 

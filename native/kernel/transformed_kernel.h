@@ -22,9 +22,12 @@ class TransformedKernel final : public Kernel {
   bool differentiable() const override { return kernel_->differentiable(); }
   double min_length_scale() const override { return kernel_->min_length_scale() * least_stretch_; }
   std::optional<std::vector<Term>> terms() const override;
+  std::optional<std::vector<ProductTerm>> products() const override;
   std::string describe() const override { return kernel_->describe() + " transformed"; }
 
  private:
+  void transform(Term& term) const;
+
   KernelPtr kernel_;
   Mat3 inverse_;
   double least_stretch_;

@@ -3,16 +3,17 @@
 // is the cubic from the start to a place so near that nothing else shows.
 #pragma once
 
+#include "core/vec.h"
 #include "process/brownian_bridge.h"
 
 namespace gpis {
 
 class NearStart {
  public:
-  void forget() { reach_ = 0; }
+  void forget() { reach_ = -kInfinity; }
   void know(double t, double g, double dg, double reach) {
     start_ = {t, g, dg};
-    reach_ = reach;
+    reach_ = t + reach > t ? reach : -kInfinity;
     far_.t = t;
   }
   bool holds(double t) const { return t - start_.t < reach_; }
@@ -30,7 +31,7 @@ class NearStart {
 
  private:
   BridgePoint start_{}, far_{};
-  double reach_ = 0;
+  double reach_ = -kInfinity;  // nothing known: not even what lies before an earlier start
 };
 
 // As far as a path that cubics miss by `deviation` h⁴ and whose slope deviates by `slope` may be

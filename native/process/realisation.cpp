@@ -7,32 +7,32 @@
 namespace gpis {
 namespace {
 
-bool on_lattice(const Term& term) {
-  return term.radial.family == Radial::Family::squared_exponential ||
-         term.radial.family == Radial::Family::constant;
+bool on_lattice(const ProductTerm& product) {
+  const auto family = product.factors[0].radial.family;
+  return product.factors.size() == 1 &&
+         (family == Radial::Family::squared_exponential || family == Radial::Family::constant);
 }
 
-std::vector<Term> terms_of(const GaussianProcess& process) {
-  const Kernel& kernel = *process.kernel;
-  const auto terms = kernel.terms();
-  if (!terms)
-    refuse("A realisation takes a kernel that is a sum of stationary terms; ", kernel.describe(),
-           " is a product without such a form. Multiply by squared exponentials and plane waves "
-           "only.");
-  return *terms;
+std::vector<ProductTerm> products_of(const GaussianProcess& process) {
+  const auto products = process.kernel->products();
+  if (!products)
+    refuse("A realisation takes kernels of at most ", Kernel::kMaxTerms, " terms; ",
+           process.kernel->describe(), " has more.");
+  return *products;
 }
 
 // Under an anisotropy: every term a sum of squared exponentials of many lengths (formulas C11).
 std::vector<Realisation::Varying> varying_fields(const GaussianProcess& process, double& error) {
   const Covariance covariance(process);  // refuses other kernels
   std::vector<Realisation::Varying> fields;
-  for (const Term& term : terms_of(process)) {
+  for (const ProductTerm& product : products_of(process)) {
+    const Term& term = product.factors[0];
     const ScaleMixture mixture = scale_mixture(term.radial);
-    error += term.weight / covariance.variance() * mixture.error;
+    error += product.weight / covariance.variance() * mixture.error;
     for (const auto& [weight, length] : mixture.parts)
       fields.push_back({VaryingLattice(process.anisotropy, length / term.max_inverse_length(),
                                        static_cast<int>(fields.size())),
-                        std::sqrt(term.weight * weight)});
+                        std::sqrt(product.weight * weight)});
   }
   return fields;
 }
@@ -41,8 +41,10 @@ std::vector<LatticeField> lattice_fields(const GaussianProcess& process) {
   std::vector<LatticeField> fields;
   int number = 0;
   if (process.anisotropy) return fields;
-  for (const Term& term : terms_of(process))
-    if (on_lattice(term)) {
+  for (const ProductTerm& product : products_of(process))
+    if (on_lattice(product)) {
+      Term term = product.factors[0];
+      term.weight = product.weight;
       fields.emplace_back(term, number);
       number += fields.back().lattices();
     }
@@ -67,8 +69,8 @@ Realisation::Realisation(const GaussianProcess& process, Access access, Posterio
   if (process.anisotropy) return;
   // Numbers apart from those of the lattices: independent streams.
   int number = 1 << 20;
-  for (const Term& term : terms_of(process))
-    if (!on_lattice(term)) spectra_.emplace_back(term, number++);
+  for (const ProductTerm& product : products_of(process))
+    if (!on_lattice(product)) spectra_.emplace_back(product, number++);
 }
 
 int Realisation::lattices() const {
@@ -227,7 +229,7 @@ std::string Realisation::describe() const {
   if (!spectra_.empty())
     text << spectra_.size() << " x " << SpectralField::kFeatures
          << " random spectral features, exact covariance, Gaussian up to an excess kurtosis of "
-            "7e-4 (values) and 4e-3 (slopes)";
+            "7e-4 (values) and 5e-3 (slopes)";
   return text.str();
 }
 

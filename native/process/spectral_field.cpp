@@ -62,23 +62,53 @@ Vec3 draw_frequency(const Radial& radial, bool biased, Rng& rng) {
 
 }  // namespace
 
-SpectralField::SpectralField(const Term& term, int number) : term_(term), number_(number) {
+SpectralField::SpectralField(ProductTerm term, int number)
+    : term_(std::move(term)), number_(number) {
   for (Array* a : {&omega_[0], &omega_[1], &omega_[2], &a_, &b_, &along_, &at_origin_, &phase_,
                    &sine_, &cosine_})
     a->resize(kFeatures);
+  for (const Term& factor : term_.factors)
+    if (!factor.radial.differentiable()) return;
+  for (const Term& factor : term_.factors) {
+    const double inverse = factor.max_inverse_length();
+    squares_.push_back(3 * factor.radial.lambda2() * inverse * inverse);
+    square_ += squares_.back();
+  }
+}
+
+Vec3 SpectralField::draw_frequency(bool biased, Rng& rng, double& weight) const {
+  std::size_t by = term_.factors.size();  // the factor that is biased
+  if (biased) {
+    by = 0;
+    if (term_.factors.size() > 1)
+      for (double left = rng.uniform() * square_; by + 1 < squares_.size(); ++by)
+        if ((left -= squares_[by]) < 0) break;
+  }
+  Vec3 sum;
+  double square = 0;
+  bool turned = false;
+  for (std::size_t i = 0; i < term_.factors.size(); ++i) {
+    const Term& factor = term_.factors[i];
+    const Vec3 k = gpis::draw_frequency(factor.radial, i == by, rng);
+    sum += transpose(factor.whitening) * k;
+    const double inverse = factor.max_inverse_length();
+    square += dot(k, k) * inverse * inverse;
+    if (!factor.modulated()) continue;
+    // cos a cos b = (cos(a + b) + cos(a - b)) / 2
+    sum += factor.wave_vector * (turned && rng.uniform() < 0.5 ? -1 : 1);
+    turned = true;
+  }
+  weight = square_ > 0 ? 2 / (1 + square / square_) : 1;
+  return sum;
 }
 
 std::uint64_t SpectralField::draw(std::uint64_t seed, std::optional<double> time) {
   const std::uint64_t key = mix64(mix64(seed) ^ static_cast<std::uint64_t>(number_));
   Rng rng(key, 0);
-  const bool weighted = term_.radial.differentiable() && term_.radial.lambda2() > 0;
-  const double mean = 3 * term_.radial.lambda2();  // E|k|²
-  const Mat3 unwhiten = transpose(term_.whitening);
-  std::uint64_t normals = 3 * kFeatures;
+  std::uint64_t normals = 3 * kFeatures * term_.factors.size();
   for (int k = 0; k < kFeatures; ++k) {
-    const Vec3 whitened = draw_frequency(term_.radial, weighted && k % 2 == 1, rng);
-    const double weight = weighted ? 2 / (1 + dot(whitened, whitened) / mean) : 1;
-    const Vec3 omega = unwhiten * whitened + term_.wave_vector;
+    double weight;
+    const Vec3 omega = draw_frequency(square_ > 0 && k % 2 == 1, rng, weight);
     for (int axis = 0; axis < 3; ++axis) omega_[axis][k] = omega[axis];
     phase_[k] = std::sqrt(term_.weight * weight / kFeatures);
   }
@@ -134,9 +164,13 @@ double SpectralField::fourth_derivative_variance() const {
 
 double SpectralField::expected_fourth_derivative_variance(const Vec3& d) const {
   // As a squared exponential of half the length scale: 1024 features of Matérn 3/2 come to that.
-  const Vec3 whitened = term_.whitening * d;
-  return term_.weight * eighth_moment(dot(term_.wave_vector, d),
-                                      4 * term_.radial.lambda2() * dot(whitened, whitened));
+  double wave = 0, variance = 0;
+  for (const Term& factor : term_.factors) {
+    const Vec3 whitened = factor.whitening * d;
+    wave += std::abs(dot(factor.wave_vector, d));
+    variance += 4 * factor.radial.lambda2() * dot(whitened, whitened);
+  }
+  return term_.weight * eighth_moment(wave, variance);
 }
 
 void SpectralField::add_slice(const Vec3& origin, double spacing, int rows, int count, float* g) {

@@ -64,3 +64,21 @@ def test_varying_lengths(field, name, n, seed):
     kernel = ROUGH.get(name, gn.SquaredExponential(1))
     gp = gn.GaussianProcess(LEVEL, 1, kernel, anisotropy=VARYING[field], bounds=((-2, -2, -2), (4, 4, 4)))
     check_near_start(gp, "auto", n, seed)
+
+
+@pytest.mark.parametrize(("name", "sampler"), SERVED)
+def test_a_line_knows_nothing_of_lines_before_it(name, sampler, seed):
+    """Rays one by one, and together by one thread that uses its line over and over: the same hits to the last bit. They come
+    into the bounds sooner or later, and start there from a truncated normal as often as not."""
+    gp = gn.GaussianProcess(0.1, 0.5, KERNELS[name], bounds=((-1, -1, -1), (1, 1, 1)))
+    n = 40
+    rng = np.random.default_rng(seed)
+    directions = rng.normal(size=(n, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    origins = rng.uniform(-0.5, 0.5, (n, 3)) - rng.uniform(2, 5, (n, 1)) * directions
+    options = {"sampler": sampler, "seed": seed, "threads": 1}
+    together = gn.first_hits(gp, origins, directions, 8, **options)
+    alone = [gn.first_hits(gp, origins[i : i + 1], directions[i : i + 1], 8, first_index=i, **options) for i in range(n)]
+    for key in ("t", "gradient"):
+        np.testing.assert_array_equal(together[key], np.concatenate([hits[key] for hits in alone]))
+    assert np.isfinite(together["t"]).sum() > n / 4

@@ -60,6 +60,7 @@ CASES = {
     "product without normal form": lambda s, turned: Case(
         gn.Matern(2.5, **s), ("markov",), joint=True, again=gn.Matern(2.5, **s) * SE(1e4), again_by="dense"
     ),
+    "product of rough kernels": lambda s, turned: Case(gn.Matern(1.5, **s) * SE(0.4), ("dense", "realisation"), joint=True),
     # The scale multiplies the deviation.
     "scaled": lambda s, turned: Case(1.7 * SE(**s), ("convolution", "spectral", "dense", "realisation")),
     "varying lengths": lambda s, turned: Case(
