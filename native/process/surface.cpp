@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "core/box_image.h"
+#include "process/bounds_cut.h"
 #include "process/conditions.h"
 #include "process/joint_line.h"
 #include "process/line_impl.h"
@@ -262,9 +263,13 @@ std::vector<std::pair<std::string, std::string>> ProcessSurface::plan() const {
       {"mean", range(process.mean->range())},
       {"sigma", range(process.sigma->range())},
       {"length_scales", lengths()},
-      {"certainly_absent", "where the mean exceeds " + number(planned_->skip_threshold) + " (" +
-                               number(planned_->skip_deviations) +
-                               " standard deviations): nothing is drawn"}};
+      {"certainly_absent",
+       "where the mean exceeds " + number(planned_->skip_threshold) +
+           (process.sigma->range().max > 0
+                ? " (" + number(planned_->skip_deviations) + " standard deviations)"
+                : "") +
+           ": nothing is drawn"},
+      {"bounds", describe_bounds(process, planned_->bounds, planned_->skip_deviations)}};
   if (const auto posterior = planned_->line_sampler->posterior())
     facts.push_back(
         {"conditions", std::to_string(posterior->conditions().points()) + " points, " +

@@ -329,3 +329,17 @@ def test_a_length_scale_that_no_ray_gets_through_gets_a_sentence():
     for process in (skin, medium):
         hits = gn.first_hits(process, [(0, 0, 3)] * 20, [(0, 0, -1)] * 20, 10.0)
         assert np.isfinite(hits["t"]).all() and hits["counters"]["line_step_limit"] == 0
+
+
+def test_the_plan_says_where_bounds_cut_the_surface():
+    """Definitions B4: rays that come in through bounds start outside, however likely that is there."""
+
+    def bounds_of(side, sigma=0.1):
+        cube = ((-side,) * 3, (side,) * 3)
+        return gn.GaussianProcess(gn.SphereField([0, 0, 0], 1), sigma, gn.SquaredExponential(0.1), bounds=cube).plan()["bounds"]
+
+    assert bounds_of(2) == bounds_of(1.1, 0) == "the surface is absent at them"
+    for side, probability in ((1.2, "0.977"), (1.0, "0.5"), (0.9, "0.159")):
+        text = bounds_of(side)
+        assert text.startswith("cut the surface: at (") and f"probability of only {probability}," in text
+    assert gn.GaussianProcess(1.0, 0.1, gn.SquaredExponential(0.1)).plan()["bounds"].startswith("none")
