@@ -8,16 +8,37 @@ import gpis_native as gn
 import numpy as np
 import pytest
 from line_samplers import KERNELS, SERVED, factorises, worth
-from statistics_checks import SIGNIFICANCE, Z_LIMIT, check_proportion, check_same_distribution, check_z
+from statistics_checks import (
+    SIGNIFICANCE,
+    Z_LIMIT,
+    check_proportion,
+    check_same_distribution,
+    check_z,
+    count_comparisons,
+    normal_cdf,
+)
 
 pytestmark = pytest.mark.stats
 every = pytest.mark.parametrize(("kernel", "sampler"), SERVED)
 X = np.array([1.0, 0, 0])
 
 
+# Few realisations say nothing of a law: of these as many are drawn as it takes, of the others at full size alone.
+REALISED = {"squared exponential": 5, "rational quadratic": 10}
+
+
 @pytest.fixture
-def n(full_size):
-    return 400_000 if full_size else 20_000
+def n(request, full_size):
+    """How many rays of the kernel and by the sampler of a test."""
+    parameters = request.node.callspec.params
+    kernel, sampler = parameters.get("kernel", "plane wave"), parameters["sampler"]
+    if sampler != "realisation":
+        return worth(kernel, sampler, 400_000 if full_size else 20_000)
+    if kernel in REALISED:
+        return (100_000 if full_size else 20_000) // REALISED[kernel]
+    if not full_size:
+        pytest.skip("realisations of this kernel are drawn at full size: few would say nothing")
+    return 2000 if kernel.startswith("sum") else 4000
 
 
 def along_x(n):
@@ -32,7 +53,7 @@ def line(length):
 def test_crossings_that_a_fixed_grid_sees(kernel, sampler, n, seed):
     """Oracle 3: of two values h apart one is above and one below its mean with probability arccos ρ(h)/π. A mean of 5
     deviations keeps the paths outside; the tolerance makes the sampler draw there."""
-    k, h, n = KERNELS[kernel], 0.3, worth(kernel, sampler, n)
+    k, h = KERNELS[kernel], 0.3
     gp = gn.GaussianProcess(5.0, 1, k, bounds=line(8))
     t = 0.1 + h * np.arange(20)
     g = gn.line_values(gp, *along_x(n), t, tolerance=1e-6, sampler=sampler, seed=seed) - 5
@@ -47,7 +68,6 @@ def test_crossings_that_a_fixed_grid_sees(kernel, sampler, n, seed):
 @pytest.mark.parametrize(("kernel", "sampler"), [p for p in SERVED if p[0] not in ("rational quadratic", "plane wave")])
 def test_mean_excursion(kernel, sampler, n, seed):
     """Oracle 4: π/√λ₂ above zero, from a start on the surface with the flux-weighted slope (Renewal)."""
-    n = worth(kernel, sampler, n)
     gp = gn.GaussianProcess(0.0, 1, KERNELS[kernel], bounds=line(30))
     state = {"value": np.zeros(n), "gradient": np.tile(X, (n, 1))}
     t = gn.first_hits(gp, *along_x(n), 29, memory="renewal", start=state, sampler=sampler, seed=seed)["t"]
@@ -61,7 +81,7 @@ def test_mean_excursion(kernel, sampler, n, seed):
 @every
 def test_reciprocity_of_free_flight(kernel, sampler, n, seed):
     """Oracle 4: P(T <= t from a random outside point) = (crossing rate / P(f > 0)) ∫₀ᵗ S(s) ds, S of an excursion."""
-    n, t, mean = worth(kernel, sampler, n), 4.0, 0.3
+    t, mean = 4.0, 0.3
     gp = gn.GaussianProcess(mean, 1, KERNELS[kernel], bounds=line(8))
     state = {"value": np.zeros(n), "gradient": np.tile(X, (n, 1))}
     free = gn.first_hits(gp, *along_x(n), t, sampler=sampler, seed=seed)["t"]
@@ -79,7 +99,7 @@ RADIAL = ("squared exponential", "matern 3/2", "matern 5/2", "wong", "rational q
 @pytest.mark.parametrize(("kernel", "sampler"), [p for p in SERVED if p[0] in RADIAL])
 def test_transverse_gradient_correlation(kernel, sampler, n, seed):
     """Oracle 9: a remembered transverse gradient decays as c(q) = -κ'(q)/(qλ₂); SE e^{-q²/2}, Matérn 3/2 e^{-√3q}."""
-    n, start, k = worth(kernel, sampler, 4 * n), np.array([0.7, 1.5, -2.0]), KERNELS[kernel]
+    n, start, k = 4 * n, np.array([0.7, 1.5, -2.0]), KERNELS[kernel]
     gp = gn.GaussianProcess(0, 1, k, bounds=line(12))
     state = {"value": np.zeros(n), "gradient": np.tile(start, (n, 1))}
     hits = gn.first_hits(gp, *along_x(n), 9, start=state, sampler=sampler, seed=seed)
@@ -105,7 +125,7 @@ def test_normals_and_slopes_over_all_crossings(kernel, sampler, n, seed):
     outside points that is too short for the first crossings to differ from all of them; where g'' jumps about no stretch is:
     there at the ends of excursions that begin with Rayleigh slopes (Renewal), by symmetry under reversal."""
     k = KERNELS[kernel]
-    n, s = worth(kernel, sampler, 4 * n), sqrt(k.derivative_variance(X))
+    n, s = 4 * n, sqrt(k.derivative_variance(X))
     if kernel in ROUGH_KERNELS:
         n //= 4
         state = {"value": np.zeros(n), "gradient": np.tile(X, (n, 1))}
@@ -137,7 +157,6 @@ LONG = {
 @every
 def test_infinite_length_scale_is_one_normal(kernel, sampler, n, seed):
     """Oracle 14: f = μ + σξ with one ξ; a sphere is missed with probability Φ((b - R)/σ)."""
-    n = worth(kernel, sampler, n)
     gp = gn.GaussianProcess(gn.SphereField([0, 0, 0], 1), 0.2, LONG[kernel](1e4), bounds=((-3,) * 3, (3,) * 3))
     for b in (0.9, 1.1):
         origins, directions = np.tile([b, 0.0, 2.8], (n, 1)), np.tile([0.0, 0, -1.0], (n, 1))
@@ -152,7 +171,7 @@ def test_infinite_length_scale_is_one_normal(kernel, sampler, n, seed):
 def test_rare_hits_are_exponential(kernel, sampler, n, seed):
     """Oracle 16: μ = 3σ, free flights of rate ν/Φ(μ/σ), ν the one-sided Rice rate; lines much longer than the memory are in
     test_rays.py. Paths that dip below 0 often do so twice: .5% of the rate at this height, more where g'' jumps about."""
-    n, k = worth(kernel, sampler, 4 * n), KERNELS[kernel]
+    n, k = 4 * n, KERNELS[kernel]
     gp = gn.GaussianProcess(3.0, 1, k, bounds=line(12))
     t = gn.first_hits(gp, *along_x(n), 11, sampler=sampler, seed=seed)["t"]
     rate = sqrt(k.derivative_variance(X)) / (2 * pi) * np.exp(-4.5) / (0.5 * erfc(-3 / sqrt(2)))
@@ -165,7 +184,7 @@ def test_rare_hits_are_exponential(kernel, sampler, n, seed):
 @every
 def test_renewal_leaves_the_surface_with_the_flux_weighted_slope(kernel, sampler, slope, n, seed):
     """Definitions B3: density ∝ v₊ N(v; m, s²) over a mean of slope m"""
-    n, s = worth(kernel, sampler, n), sqrt(KERNELS[kernel].derivative_variance(X))
+    s = sqrt(KERNELS[kernel].derivative_variance(X))
     gp = gn.GaussianProcess(gn.PlaneField([0, 0, 0], X, slope), 1, KERNELS[kernel], bounds=line(8))
     state = {"value": np.zeros(n), "gradient": np.tile(X, (n, 1))}
     t = 1e-4
@@ -196,7 +215,7 @@ def test_paths_are_smooth(sampler, h, seed):
 def test_small_scales(kernel, sampler, n, seed):
     """Second differences over a 25th of a length scale, whose variance is a few thousandths: bridges and tables inside of
     cells, which the correlation itself hardly feels. Joint dense lines are cubics there."""
-    k, h, n = KERNELS[kernel], 0.04, worth(kernel, sampler, n)
+    k, h = KERNELS[kernel], 0.04
     gp = gn.GaussianProcess(5.0, 1, k, bounds=line(8))
     t = 0.02 + h * np.arange(24)
     g = gn.line_values(gp, *along_x(n), t, tolerance=1e-6, sampler=sampler, seed=seed) - 5
@@ -213,7 +232,7 @@ def test_small_scales(kernel, sampler, n, seed):
 @every
 def test_occupancy(kernel, sampler, n, seed):
     """Oracle 1, and what a fresh ray is: f > 0 by Φ(μ/σ) alone, so that its value at the start is a normal truncated at 0."""
-    n, mu = worth(kernel, sampler, n), 0.4
+    mu = 0.4
     gp = gn.GaussianProcess(mu, 1, KERNELS[kernel], bounds=line(8))
     f = gn.line_values(gp, *along_x(n), [1e-9], sampler=sampler, seed=seed)[:, 0]
     assert np.isfinite(f).mean() > 0.999
@@ -226,7 +245,7 @@ def test_occupancy(kernel, sampler, n, seed):
 @pytest.mark.parametrize("sampler", ["spectral", "nystrom", "dense", "realisation"])
 def test_plane_wave(sampler, n, seed):
     """Oracle 15: T = 1 - wt/π from outside, excursions of π/w exactly."""
-    n, wave = worth("plane wave", sampler, n), np.array([2.0, 0.5, 1.0])
+    wave = np.array([2.0, 0.5, 1.0])
     gp = gn.GaussianProcess(0, 1, gn.PlaneWave(wave), bounds=((-9, -9, -9), (9, 9, 9)))
     direction = np.array([0.48, -0.64, 0.6])
     w = abs(wave @ direction)
@@ -287,3 +306,25 @@ def test_a_render_of_a_stationary_kernel_factorises_nothing_per_ray(kernel, memo
     for counters in twice(memory):
         assert counters["factorisations"] == 0 and counters["line_normals"] > 0
     assert twice("global-1")[1]["factorisations"] > 0
+
+
+@pytest.mark.parametrize("mean", [-1.0, -8.0, -25.0])
+@every
+def test_entry_from_outside_the_bounds(kernel, sampler, mean, n, seed):
+    """Definitions B4: a ray that comes from outside enters with f > 0 however unlikely that is, by the normal law of deviation 1
+    about the mean truncated at 0: P(f > x) = Φ(μ - x)/Φ(μ). It falls from there."""
+    gp = gn.GaussianProcess(mean, 1, KERNELS[kernel], bounds=((0, -1, -1), (4, 1, 1)))
+    rays = np.tile([-3.0, 0.1, 0.2], (n, 1)), np.tile(X, (n, 1))
+    f = np.sort(gn.line_values(gp, *rays, [3 + 1e-9], sampler=sampler, seed=seed)[:, 0])
+    f = f[np.isfinite(f)]
+    assert len(f) > 0.999 * n and f[0] > 0
+    cdf = 1 - normal_cdf(mean - f) / normal_cdf(mean)
+    steps = np.arange(len(f) + 1) / len(f)
+    count_comparisons(1)
+    distance = max(np.max(steps[1:] - cdf), np.max(cdf - steps[:-1]))
+    assert 2 * np.exp(-2 * len(f) * distance**2) > SIGNIFICANCE, distance
+    hits = gn.first_hits(gp, *rays, 7, sampler=sampler, seed=seed)
+    hit = np.isfinite(hits["t"])
+    assert np.min(hits["t"]) > 3 and np.all(hits["gradient"][hit, 0] <= 0)
+    if mean == -25:
+        assert np.all(hit)
