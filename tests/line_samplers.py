@@ -27,6 +27,8 @@ SAMPLERS = {
     "sum of rough terms": ROUGH,
 }
 SERVED = [(kernel, sampler) for kernel, samplers in SAMPLERS.items() for sampler in samplers]
+# g'' of these jumps about: it has no variance.
+ROUGH_KERNELS = ("matern 3/2", "wong", "sum with a rough term", "sum of rough terms")
 # `dense` of these draws every line from its own covariance.
 JOINT = ["locally periodic", "plane wave", "sum with a rough term", "sum of rough terms"]
 

@@ -7,7 +7,7 @@ from math import erfc, pi, sqrt
 import gpis_native as gn
 import numpy as np
 import pytest
-from line_samplers import KERNELS, SERVED, factorises, worth
+from line_samplers import KERNELS, ROUGH_KERNELS, SERVED, factorises, worth
 from statistics_checks import (
     SIGNIFICANCE,
     Z_LIMIT,
@@ -115,7 +115,6 @@ def test_transverse_gradient_correlation(kernel, sampler, n, seed):
         check_z((scaled * c).mean(), 0, sqrt((c**2).mean() / m))
 
 
-ROUGH_KERNELS = ("matern 3/2", "wong", "sum with a rough term", "sum of rough terms")
 SLOPES_ALIKE = (*RADIAL, "sum with a rough term", "sum of rough terms")
 
 
