@@ -7,7 +7,7 @@ from math import erf, exp, pi, sqrt
 import gpis_native as gn
 import numpy as np
 import pytest
-from line_samplers import KERNELS, ROUGH_KERNELS, SERVED, factorises, worth
+from line_samplers import KERNELS, ROUGH_KERNELS, SERVED, factorises
 from statistics_checks import SIGNIFICANCE, check_proportion, check_same_distribution, check_z
 
 pytestmark = pytest.mark.stats
@@ -189,25 +189,37 @@ def visible_cosine(direction, slope, edges, rng, height_field, n=1_000_000):
     return histogram / histogram.sum()
 
 
+FAMILIES = {
+    "squared exponential": gn.SquaredExponential,
+    "matern 5/2": lambda length: gn.Matern(2.5, length),
+    "rational quadratic": lambda length: gn.RationalQuadratic(1, length),
+}
+# As far as the law is asked for of other kernels: their departures beyond are larger ones.
+VISIBLE = [("squared exponential", 15), ("squared exponential", 45), ("squared exponential", 70)]
+VISIBLE += [(family, degrees) for family in ("matern 5/2", "rational quadratic") for degrees in (15, 45)]
+
+
 @pytest.mark.parametrize("kernel", ["height field", "isotropic"])
-@pytest.mark.parametrize("degrees", [15, 45, 70])
-def test_visible_normals(kernel, degrees, n, seed, figure):
+@pytest.mark.parametrize(("family", "degrees"), VISIBLE)
+def test_visible_normals(kernel, family, degrees, n, seed, figure):
     """Oracle 12: total variation of n·ω below .01 (.02 for α = 1) up to 45°; grazing measured, its departures are real."""
+    n //= 2 if family == "rational quadratic" else 1
     theta, edges = np.radians(degrees), np.linspace(0, 1, 21)
     direction = np.array([-np.sin(theta), 0, -np.cos(theta)])
-    scale = [0.1, 0.1, np.inf] if kernel == "height field" else 0.1
-    for alpha, bound in ((0.1, 0.01), (0.5, 0.01), (1, 0.02)):
-        sigma = alpha * 0.1 / np.sqrt(2)
-        gp = gn.GaussianProcess(gn.PlaneField([0, 0, 0], [0, 0, 1], 1), sigma, gn.SquaredExponential(scale))
+    noise = FAMILIES[family]([0.1, 0.1, np.inf] if kernel == "height field" else 0.1)
+    for alpha, bound in ((0.1, 0.01), (0.5, 0.01), (1, 0.02))[: 3 if family == "squared exponential" else 2]:
+        slope = alpha / np.sqrt(2)
+        sigma = slope / np.sqrt(noise.derivative_variance([1, 0, 0]))
+        gp = gn.GaussianProcess(gn.PlaneField([0, 0, 0], [0, 0, 1], 1), sigma, noise)
         hits = gn.first_hits(gp, *rays(n, -3 * direction, direction), 10, seed=seed)
         hit = np.isfinite(hits["t"])
         assert hit.mean() > 0.9999
         seen = -hits["gradient"][hit] @ direction / np.linalg.norm(hits["gradient"][hit], axis=1)
         assert np.all(seen >= 0)
         got = np.histogram(seen, edges)[0] / hit.sum()
-        expected = visible_cosine(direction, sigma / 0.1, edges, np.random.default_rng(seed), kernel == "height field")
+        expected = visible_cosine(direction, slope, edges, np.random.default_rng(seed), kernel == "height field")
         variation = 0.5 * np.abs(got - expected).sum()
-        figure(f"Oracle 12: {kernel}, {degrees} degrees, alpha {alpha}: total variation of n·ω {variation:.4f}")
+        figure(f"Oracle 12: {kernel}, {family}, {degrees} degrees, alpha {alpha}: total variation of n·ω {variation:.4f}")
         assert variation < (bound if degrees <= 45 else 0.035)
 
 
@@ -227,22 +239,28 @@ def test_rare_hits_are_exponential(kernel, seed):
 @pytest.mark.parametrize("alpha", [0.1, 0.5, 1])
 @pytest.mark.parametrize("degrees", [15, 45, 70])
 @pytest.mark.parametrize("sampler", ["spectral", "nystrom", "dense", "realisation"])
-def test_visible_normals_by_other_samplers(sampler, degrees, alpha, n, seed, figure):
-    """Oracle 12, isotropic: Kolmogorov's distance of n·ω to its law less what that law is off by."""
-    n, edges, theta = worth("squared exponential", sampler, n), np.linspace(0, 1, 2001), np.radians(degrees)
+@pytest.mark.parametrize("kernel", ["height field", "isotropic"])
+def test_visible_normals_by_other_samplers(kernel, sampler, degrees, alpha, n, full_size, seed, figure):
+    """Oracle 12: Kolmogorov's distance of n·ω to its law less what that law is off by."""
+    if sampler == "realisation" and alpha != 0.5 and not full_size:
+        pytest.skip("realisations of this slope are drawn at full size: few would say nothing")
+    n //= {"realisation": 50 if full_size else 20, "nystrom": 5}.get(sampler, 1)
+    edges, theta = np.linspace(0, 1, 2001), np.radians(degrees)
     direction = np.array([-np.sin(theta), 0, -np.cos(theta)])
     sigma = alpha * 0.1 / sqrt(2)
+    flat = kernel == "height field"
+    noise = gn.SquaredExponential([0.1, 0.1, np.inf] if flat else 0.1)
     high = max(0.15, 4.8 * sigma)
     bounds = ((-3.2 * high - 0.3, -0.3, -high), (3.2 * high + 0.3, 0.3, high))
-    gp = gn.GaussianProcess(gn.PlaneField([0, 0, 0], [0, 0, 1], 1), sigma, gn.SquaredExponential(0.1), bounds=bounds)
+    gp = gn.GaussianProcess(gn.PlaneField([0, 0, 0], [0, 0, 1], 1), sigma, noise, bounds=bounds)
     hits = gn.first_hits(gp, *rays(n, -3 * direction, direction), 10, sampler=sampler, seed=seed)
     gradient = hits["gradient"][np.isfinite(hits["t"])]
     assert len(gradient) > 0.999 * n
     seen = np.sort(-gradient @ direction / np.linalg.norm(gradient, axis=1))
-    law = np.append(0, np.cumsum(visible_cosine(direction, sigma / 0.1, edges, np.random.default_rng(seed), False)))
+    law = np.append(0, np.cumsum(visible_cosine(direction, sigma / 0.1, edges, np.random.default_rng(seed), flat)))
     steps, cdf = np.arange(len(seen) + 1) / len(seen), np.interp(seen, edges, law)
     distance = max(np.max(steps[1:] - cdf), np.max(cdf - steps[:-1]))
-    figure(f"Oracle 12: isotropic, {degrees}°, alpha {alpha}, {sampler}: largest difference of the laws of n·ω {distance:.4f}")
+    figure(f"Oracle 12: {kernel}, {degrees}°, alpha {alpha}, {sampler}: the laws of n·ω differ by {distance:.4f}")
     off = (0.006 if alpha < 1 else 0.014) if degrees <= 45 else 0.025
     assert 2 * np.exp(-2 * len(seen) * max(distance - off, 0) ** 2) > SIGNIFICANCE, distance
 
