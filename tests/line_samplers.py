@@ -13,6 +13,18 @@ KERNELS = {
     "sum with a rough term": 0.6 * gn.SquaredExponential(1) + 0.4 * gn.Matern(1.5, 1),
     "sum of rough terms": 0.5 * gn.Matern(1.5, 1) + 0.3 * gn.Matern(2.5, 0.6) + 0.2 * gn.Wong(0.8),
 }
+# With a length scale to be given.
+LONG = {
+    "squared exponential": gn.SquaredExponential,
+    "matern 3/2": lambda length: gn.Matern(1.5, length),
+    "matern 5/2": lambda length: gn.Matern(2.5, length),
+    "wong": gn.Wong,
+    "rational quadratic": lambda length: gn.RationalQuadratic(0.7, length),
+    "locally periodic": lambda length: gn.LocallyPeriodic(length, length, [0.6, 0.8, 0], 1.0),
+    "plane wave": lambda length: gn.PlaneWave([1 / length, 0, 0]),
+    "sum with a rough term": lambda length: 0.6 * gn.SquaredExponential(length) + 0.4 * gn.Matern(1.5, length),
+    "sum of rough terms": lambda length: 0.6 * gn.Wong(length) + 0.4 * gn.Matern(2.5, length),
+}
 SMOOTH = ["spectral", "nystrom", "dense", "realisation"]
 ROUGH = ["markov", "dense", "realisation"]
 SAMPLERS = {

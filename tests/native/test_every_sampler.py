@@ -7,7 +7,7 @@ from math import erfc, pi, sqrt
 import gpis_native as gn
 import numpy as np
 import pytest
-from line_samplers import KERNELS, ROUGH_KERNELS, SERVED, factorises, worth
+from line_samplers import KERNELS, LONG, ROUGH_KERNELS, SERVED, factorises, worth
 from statistics_checks import (
     SIGNIFICANCE,
     Z_LIMIT,
@@ -138,19 +138,6 @@ def test_normals_and_slopes_over_all_crossings(kernel, sampler, n, seed):
     rng = np.random.default_rng(seed)
     check_same_distribution(-g[:, 0] / np.linalg.norm(g, axis=1), np.sqrt(rng.uniform(size=100_000)), "n·d")
     check_same_distribution(-g[:, 0] / s, rng.rayleigh(size=100_000), "slope")
-
-
-LONG = {
-    "squared exponential": gn.SquaredExponential,
-    "matern 3/2": lambda length: gn.Matern(1.5, length),
-    "matern 5/2": lambda length: gn.Matern(2.5, length),
-    "wong": gn.Wong,
-    "rational quadratic": lambda length: gn.RationalQuadratic(0.7, length),
-    "locally periodic": lambda length: gn.LocallyPeriodic(length, length, [0.6, 0.8, 0], 1.0),
-    "plane wave": lambda length: gn.PlaneWave([1 / length, 0, 0]),
-    "sum with a rough term": lambda length: 0.6 * gn.SquaredExponential(length) + 0.4 * gn.Matern(1.5, length),
-    "sum of rough terms": lambda length: 0.6 * gn.Wong(length) + 0.4 * gn.Matern(2.5, length),
-}
 
 
 @every
