@@ -1,10 +1,11 @@
-"""Condition points: values and gradients of f that are known (the design's math.md §3), against Gaussian process regression
-written here."""
+"""Condition points: values and gradients of f that are known (the design's math.md §3) against Gaussian process regression
+by numpy (regression.py)."""
 
 import gpis_native as gn
 import numpy as np
 import pytest
-from statistics_checks import check_same_distribution, check_z
+from regression import Regression, check_law
+from statistics_checks import check_same_distribution
 
 pytestmark = pytest.mark.stats
 
@@ -41,55 +42,12 @@ def process(kernel="se", conditions=None, mean=MEAN, sigma=SIGMA):
     return gn.GaussianProcess(mean, sigma, KERNELS[kernel], conditions=conditions, bounds=BOUNDS)
 
 
-class Regression:
-    """The posterior of f by solving one system; covariances of (g, ∇g) from the process (test_covariance.py)."""
-
-    def __init__(self, prior, c, mean=MEAN, sigma=SIGMA):
-        self.prior, self.mean, self.sigma, self.points = prior, mean, sigma, np.asarray(c["points"])
-        rows, values, noise = [], [], []
-        m, dm, s, ds = mean(self.points), mean.gradient(self.points), sigma(self.points), sigma.gradient(self.points)
-        for i in range(len(self.points)):
-            if not np.isnan(c["values"][i]):
-                rows.append((i, [s[i], 0, 0, 0]))
-                values.append(c["values"][i] - m[i])
-                noise.append(c["noise"][i] ** 2)
-            if not np.isnan(c["normals"][i]).any():
-                for axis in range(3):
-                    what = np.zeros(4)
-                    what[0], what[1 + axis] = ds[i, axis], s[i]
-                    rows.append((i, what))
-                    values.append(c["slopes"][i] * c["normals"][i, axis] - dm[i, axis])
-                    noise.append(0.0)
-        self.at = np.array([i for i, _ in rows])
-        self.what = np.array([w for _, w in rows])
-        self.values = np.array(values)
-        blocks = prior.joint_covariance(self.points[self.at], self.points[self.at])
-        self.gram = np.einsum("ia,ijab,jb->ij", self.what, blocks, self.what) + np.diag(noise)
-
-    def law(self, x):
-        """Mean and covariance of f at points x."""
-        s = self.sigma(x)
-        cross = s[:, None] * np.einsum("ija,ja->ij", self.prior.joint_covariance(x, self.points[self.at])[:, :, 0], self.what)
-        mean = self.mean(x) + cross @ np.linalg.solve(self.gram, self.values)
-        return mean, self.prior.covariance(x, x) - cross @ np.linalg.solve(self.gram, cross.T)
-
-
-def check_law(samples, mean, covariance, slack=0.0, what=""):
-    """Means and covariances of rows of samples; `slack` of the prior's deviation is allowed for the representation."""
-    n, sd = len(samples), np.sqrt(np.maximum(np.diag(covariance), 1e-14))
-    check_z(np.sign(d := samples.mean(axis=0) - mean) * np.maximum(np.abs(d) - slack, 0), 0, sd / np.sqrt(n), f"{what} mean")
-    c = samples - mean
-    error = np.sqrt((np.outer(sd, sd) ** 2 + covariance**2) / n)
-    d = c.T @ c / n - covariance
-    check_z(np.sign(d) * np.maximum(np.abs(d) - slack, 0), 0, error, f"{what} covariance")
-
-
 @pytest.mark.parametrize("kernel", KERNELS)
 def test_posterior_is_that_of_regression(kernel):
     c = some_conditions()
     x = np.random.default_rng(1).uniform(-1.5, 1.5, (200, 3))
     mean, variance = process(kernel, c).posterior(x)
-    expected, covariance = Regression(process(kernel), c).law(x)
+    expected, covariance = Regression(process(kernel), c, MEAN, SIGMA).law(x)
     assert np.abs(mean - expected).max() < 1e-9
     assert np.abs(variance - np.diag(covariance)).max() < 1e-10
     assert np.abs(expected - MEAN(x)).max() > 0.1  # the conditions matter
@@ -162,7 +120,7 @@ def test_samples_and_realisations_follow_the_posterior(kernel, seed, full_size):
     c = some_conditions()
     gp = process(kernel, c)
     x = np.concatenate([c["points"], np.random.default_rng(3).uniform(-1, 1, (4, 3))])
-    mean, covariance = Regression(process(kernel), c).law(x)
+    mean, covariance = Regression(process(kernel), c, MEAN, SIGMA).law(x)
     check_law(gp.sample(x, n, seed), mean, covariance, 1e-6, "sample")
     known = ~np.isnan(c["values"]) & (c["noise"] == 0)
     realisations = gp.realisation_at(x, seed, n if kernel == "se" else n // 10)
@@ -213,7 +171,7 @@ def test_lines_follow_the_posterior(kernel, sampler, start, seed, full_size):
     f = gn.line_values(gp, np.tile(o, (n, 1)), np.tile(d, (n, 1)), t, start=begin, sampler=sampler, tolerance=1e-9, seed=seed)
     f = f[np.isfinite(f).all(axis=1)]
     assert len(f) > 0.99 * n
-    mean, covariance = Regression(process(kernel, None, far), known, far).law(o + t[:, None] * d)
+    mean, covariance = Regression(process(kernel, None, far), known, far, SIGMA).law(o + t[:, None] * d)
     # The realisation takes the start by Matheron's rule too; Nyström leaves 1e-7 of variance, dense a cubic between.
     check_law(f, mean, covariance, 3e-4, f"{kernel} {sampler} {start}")
 
