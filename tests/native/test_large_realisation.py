@@ -78,18 +78,35 @@ def test_it_is_a_level_set(made, tmp_path):
     check_linear(gp.realisation_at(hits["position"], 5)["value"])
 
 
-def test_lengths_that_vary_on_a_grid_of_many_nodes(seed):
-    """Lengths from .1 to .4: nodes are the values at points, and in a plane where the lengths are one the covariance is that of
-    Paciorek and Schervish with another such plane (here ((l l')/s²)^{3/2} exp(-r²/2s²), s² the mean of their squares)."""
-    nodes, length = 48, lambda x: 0.1 * 4 ** np.clip(x + 0.5, 0, 1)
-    field = along_x(lambda x: isotropic(length(x)), 2, 129)
-    gp = gn.GaussianProcess(0.0, 1.0, gn.SquaredExponential(1.0), anisotropy=field)
-    step = 2 / (nodes - 1)
+def test_lengths_that_vary_on_a_grid_of_many_nodes(full_size, seed):
+    """Lengths from .05 to .2: nodes are the values at points, and in a plane where the lengths are one the covariance is that of
+    Paciorek and Schervish with another such plane (here ((l l')/s²)^{3/2} exp(-r²/2s²), s² the mean of their squares). By how much
+    neighbours differ tells lengths best. Points behind those planes are held."""
+    nodes, length = 256 if full_size else 64, lambda x: 0.05 * 4 ** np.clip(x + 0.5, 0, 1)
+    field, step = along_x(lambda x: isotropic(length(x)), 2, 129), 2 / (nodes - 1)
+    held = np.round(np.array([[0.96, 0.6, 0.3], [0.97, 0.2, 0.6], [0.94, 0.8, 0.7]]) * (nodes - 1)).astype(int)
+    conditions = {"points": -1 + step * held, "values": [0.3, -0.2, np.nan], "slopes": np.array([1, 0.7, 1.2])}
+    conditions["normals"] = np.array([[np.nan] * 3, [0, 0.6, 0.8], [0, -1, 0]])
+    gp = gn.GaussianProcess(0.0, 1.0, gn.SquaredExponential(1.0), anisotropy=field, conditions=conditions)
     grid = gp.realisation(((-1, -1, -1), (1, 1, 1)), nodes, seed)["realisation"]
+    assert grid.shape == (nodes,) * 3
     index = np.random.default_rng(seed).integers(0, nodes, (60, 3))
     np.testing.assert_allclose(grid[tuple(index.T)], gp.realisation_at(-1 + step * index, seed)["value"][0], atol=1e-5)
+    at = gp.realisation_at(-1 + step * held, seed)
+    np.testing.assert_allclose(at["value"][0, :2], [0.3, -0.2], atol=1e-8)
+    np.testing.assert_allclose(at["gradient"][0, 1:], conditions["slopes"][1:, None] * conditions["normals"][1:], atol=1e-6)
+    np.testing.assert_allclose(grid[tuple(held[:2].T)], [0.3, -0.2], atol=1e-5)  # in single precision
+    for i in (1, 2):
+        for axis in (1, 2):
+            around = [grid[tuple(held[i] + s * np.eye(3, dtype=int)[axis])] for s in (-2, -1, 1, 2)]
+            slope = np.dot(around, [1, -8, 8, -1]) / (12 * step)
+            # h⁴/30 of the fifth derivative, of deviation √945/l⁵, and single precision.
+            off = 4 * (step / 0.2) ** 4 / 30 * np.sqrt(945) / 0.2 + 5e-6 / step
+            assert abs(slope - conditions["slopes"][i] * conditions["normals"][i, axis]) < off, (i, axis)
     area = (2 - 0.1) ** 2
-    for i, j, lag in [(5, 5, 0), (10, 11, 1), (22, 24, 1), (24, 25, 0)]:
+    for a, b, lag in [(-0.79, -0.79, 0), (-0.58, -0.55, 0.03), (-0.05, 0.03, 0.03), (0.04, 0.08, 0)]:
+        i, j = (round((x + 1) / step) for x in (a, b))
+        lag = round(lag / step)
         # As it is interpolated.
         a, b = (np.sqrt(field([[-1 + step * n, 0, 0]])[0, 0]) for n in (i, j))
         s2, r2 = (a * a + b * b) / 2, step**2 * ((i - j) ** 2 + lag**2)
@@ -97,3 +114,13 @@ def test_lengths_that_vary_on_a_grid_of_many_nodes(seed):
         product = np.mean(grid[i, lag:, :] * grid[j, : nodes - lag, :], dtype=float)
         # Variance as above, of a plane; edges make it a little more.
         check_z(product, expected, np.sqrt(np.pi * s2 * (1 + expected**2) / area), f"{i} {j} {lag}")
+    # Of all lengths one, and where they grow: squares of γ = 2ρ(u) - ρ(u + r) - ρ(u - r), at the longest length of the slab.
+    for low, high in [(-1, -0.5), (-0.5, -0.2)]:
+        planes = slice(int(np.ceil((low + 1) / step)), int((high + 1) / step))
+        l2, r2 = field([[-1 + step * n, 0, 0] for n in range(planes.start, planes.stop)])[:, 0], step**2
+        expected, longest = np.mean(2 - 2 * np.exp(-r2 / (2 * l2))), l2.max()
+        square = 6 - 8 * np.exp(-r2 / (4 * longest)) + 2 * np.exp(-r2 / longest)
+        error = np.sqrt(2 * np.pi**1.5 * longest**1.5 * square / ((high - low - 2 * step) * 4))
+        for axis in (1, 2):
+            moved = np.mean(np.diff(grid[planes], axis=axis) ** 2, dtype=float)
+            check_z(moved, expected, error, f"neighbours from {low} to {high}")
