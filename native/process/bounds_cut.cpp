@@ -41,9 +41,10 @@ std::string describe_bounds(const GaussianProcess& process, const Box3& bounds, 
     return text.str();
   }
   text << "cut the surface: at (" << at.x << ", " << at.y << ", " << at.z
-       << ") on them the process is outside with a probability of only "
-       << 0.5 * std::erfc(-least / std::sqrt(2.0))
-       << ", yet a ray that comes in there finds it outside. Larger bounds leave nothing out; an "
+       << ") on them the process is inside with probability "
+       << 0.5 * std::erfc(least / std::sqrt(2.0))
+       << (process.conditions ? " (conditions left out)" : "")
+       << ", and a ray that comes in there finds it outside. Larger bounds leave nothing out; an "
           "intersection with a box makes a solid that is cut";
   return text.str();
 }

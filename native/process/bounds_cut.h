@@ -8,8 +8,8 @@
 
 namespace gpis {
 
-// For a plan: where on the bounds the process is least outside and how likely that is, looked for
-// on a grid over their faces. `enough`: deviations of the mean that are certain to be outside.
+// For a plan: where on the bounds the process is most likely inside, and how likely, looked for on
+// a grid over their faces. `enough`: deviations of the mean that are certain to be outside.
 std::string describe_bounds(const GaussianProcess& process, const Box3& bounds, double enough);
 
 }  // namespace gpis

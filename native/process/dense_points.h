@@ -16,6 +16,7 @@ class DensePoints {
     double lengths, kinks, missed;
     double roughness = 0;  // see roughness_under
     double first = 1;      // see first_under
+    double widest = 1;     // what `lengths` was before it had to be shortened for others
   };
   // q of Var(g'(t + h) - g'(t)) = q h + O(h²) where A is 1, 0 of smoother paths and of kernels that
   // take no A.
@@ -31,7 +32,10 @@ class DensePoints {
              const Spacing& spacing, double anchor, double step);
   // Value and slope are known at the anchor: intervals grow from there.
   void start_known() { first_ = spacing_.first * step_; }
-  bool grows(double t) const { return first_ > 0 && t - anchor_ < step_; }
+  // So close to it that what the start leaves open is small.
+  bool grows(double t) const {
+    return first_ > 0 && t - anchor_ < step_ * (spacing_.widest / spacing_.lengths);
+  }
   // The point behind one at t.
   double after(double t) const;
   // That q at t.

@@ -39,6 +39,7 @@ JointDensePath::Plan::Plan(const GaussianProcess& process, const Box3& bounds)
       spacing{covariance.smooth() ? 0.25 : 0.15, 0.04, 5e-4,
               DensePoints::roughness_under(process)} {
   spacing.first = DensePoints::first_under(process, spacing.lengths);
+  spacing.widest = spacing.lengths;
   const std::vector<SurveyLine> lines = survey_lines(covariance, bounds);
   // Closer points until the cubics are good enough for lengths that vary.
   for (;; spacing.lengths *= 0.8, spacing.kinks *= 0.5, spacing.missed *= 0.5) {

@@ -186,7 +186,10 @@ void NystromPath::prepare(long cell, Rng& rng, Counters& counters) {
     nodes_.push_back(node(left));
     draw(nodes_.back(), rng, counters);
   }
-  while (nodes_.back().t < right || intervals_.empty()) extend(rng, counters);
+  // Behind a known start the first interval is short: the node behind it matters there too.
+  const std::size_t least = start_known_ ? 2 : 1;
+  while (nodes_.back().t < right || (intervals_.size() < least && std::isfinite(nodes_.back().t)))
+    extend(rng, counters);
   if (varies())
     margin_ = 1 + pull(left) / 4.5;
   else if (std::isfinite(step_) && margin_ < 0)

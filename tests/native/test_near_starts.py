@@ -26,13 +26,13 @@ def n(full_size):
     return 200_000 if full_size else 40_000
 
 
-def check_near_start(gp, sampler, n, seed, allowed=0.01):
+def check_near_start(gp, sampler, n, seed, allowed=0.01, t=T):
     """Mean and variance of f given value and gradient at the origin, by the joint covariance of gradients and values."""
     start = {"value": np.full(n, LEVEL + 0.5), "gradient": np.tile([0.5, 0.2, -0.3], (n, 1))}
-    f = gn.line_values(gp, np.zeros((n, 3)), np.tile(D, (n, 1)), T, start=start, sampler=sampler, tolerance=1e-9, seed=seed)
+    f = gn.line_values(gp, np.zeros((n, 3)), np.tile(D, (n, 1)), t, start=start, sampler=sampler, tolerance=1e-9, seed=seed)
     assert np.isfinite(f).all(axis=1).mean() > 0.999
     f = f[np.isfinite(f).all(axis=1)] - LEVEL
-    x, origin = T[:, None] * D, np.zeros((1, 3))
+    x, origin = t[:, None] * D, np.zeros((1, 3))
     given, across = gp.joint_covariance(origin, origin)[0, 0], gp.joint_covariance(x, origin)[:, 0, 0]
     weights = np.linalg.lstsq(given, across.T, rcond=1e-12)[0].T
     mean = weights @ [0.5, 0.5, 0.2, -0.3]
@@ -64,6 +64,14 @@ def test_varying_lengths(field, name, n, seed):
     kernel = ROUGH.get(name, gn.SquaredExponential(1))
     gp = gn.GaussianProcess(LEVEL, 1, kernel, anisotropy=VARYING[field], bounds=((-2, -2, -2), (4, 4, 4)))
     check_near_start(gp, "auto", n, seed)
+
+
+@pytest.mark.parametrize("name", ["squared exponential", "matern 5/2"])
+def test_points_that_are_closer_for_others(name, n, seed):
+    """Bounds that hold the end of a grid of lengths, where A has a kink: all points of dense lines are closer than elsewhere."""
+    kernel = ROUGH.get(name, gn.SquaredExponential(1))
+    gp = gn.GaussianProcess(LEVEL, 1, kernel, anisotropy=VARYING["length e^{x/4}"], bounds=((-2, -6, -2), (30, 6, 30)))
+    check_near_start(gp, "dense", n, seed, t=np.array([0.02, 0.03, 0.04, 0.05, 0.06, 0.1, 0.2]))
 
 
 @pytest.mark.parametrize(("name", "sampler"), SERVED)
