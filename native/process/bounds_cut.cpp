@@ -5,7 +5,8 @@
 namespace gpis {
 namespace {
 
-constexpr int kAcross = 24;  // intervals along an edge
+constexpr int kAcross = 24;    // intervals along an edge
+constexpr double kRare = 3.0;  // deviations outside of which what is cut is next to nothing
 
 double deviations(const GaussianProcess& process, const Vec3& x) {
   const double mean = process.mean->value(x), sigma = process.sigma->value(x);
@@ -34,18 +35,19 @@ std::string describe_bounds(const GaussianProcess& process, const Box3& bounds, 
             at = x;
           }
         }
+  if (least >= enough) return "the surface is absent at them";
   std::ostringstream text;
   text.precision(3);
-  if (least >= enough) {
-    text << "the surface is absent at them";
-    return text.str();
-  }
-  text << "cut the surface: at (" << at.x << ", " << at.y << ", " << at.z
-       << ") on them the process is inside with probability "
-       << 0.5 * std::erfc(least / std::sqrt(2.0))
-       << (process.conditions ? " (conditions left out)" : "")
-       << ", and a ray that comes in there finds it outside. Larger bounds leave nothing out; an "
-          "intersection with a box makes a solid that is cut";
+  const double inside = 0.5 * std::erfc(least / std::sqrt(2.0));
+  if (least >= kRare)
+    text << "the surface is all but absent at them: inside with probability " << inside
+         << " at most";
+  else
+    text << "cut the surface: at (" << at.x << ", " << at.y << ", " << at.z
+         << ") on them the process is inside with probability " << inside
+         << ", and a ray that comes in there finds it outside. Larger bounds leave nothing out; an "
+            "intersection with a box makes a solid that is cut";
+  if (process.conditions) text << " (conditions not looked at)";
   return text.str();
 }
 

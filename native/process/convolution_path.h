@@ -17,7 +17,6 @@ namespace gpis {
 class ConvolutionPath {
  public:
   static constexpr int kStride = 2;
-  static constexpr double kLastStep = 1e-5;
   struct Plan {
     Plan(const GaussianProcess& process, const Box3& bounds);
     double correlation_error = 9e-8;
@@ -35,6 +34,7 @@ class ConvolutionPath {
   }
 
   double step() const { return step_; }
+  double last_step() const { return 1e-5; }
   double value_mean() const { return 0; }
   double value_deviation() const { return 1; }
   void slope_law(double, double& mean, double& deviation) const {

@@ -28,7 +28,6 @@ class DenseFactor;
 class DensePath {
  public:
   static constexpr int kStride = 1;
-  static constexpr double kLastStep = 0;
   struct Plan {
     Plan(const GaussianProcess& process, const Box3& bounds);
 
@@ -53,6 +52,7 @@ class DensePath {
              Counters& counters);
 
   double step() const { return step_; }
+  double last_step() const { return plan_->intensity > 0 ? 0 : 1e-5; }
   double value_mean() const { return 0; }
   double value_deviation() const { return 1; }
   void slope_law(double, double& mean, double& deviation) const {

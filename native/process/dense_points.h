@@ -38,6 +38,7 @@ class DensePoints {
   }
   // The point behind one at t.
   double after(double t) const;
+  bool rough() const { return spacing_.roughness > 0 || intensity_ > 0; }
   // That q at t.
   double slope_intensity(double t) const;
   // |implied - exact correlation| that the cubics over two intervals, the same or the second behind

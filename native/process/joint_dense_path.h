@@ -17,7 +17,6 @@ namespace gpis {
 class JointDensePath : public JointLine {
  public:
   static constexpr int kStride = 1;
-  static constexpr double kLastStep = 0;
   struct Plan : JointLine::Plan {
     Plan(const GaussianProcess& process, const Box3& bounds);
     DensePoints::Spacing spacing;
@@ -26,6 +25,7 @@ class JointDensePath : public JointLine {
   void reset(const Plan& plan, const LineGeometry& line, double anchor, double t_end,
              Counters& counters);
   double step() const { return step_; }
+  double last_step() const { return where_.rough() ? 0 : 1e-5; }
   void start_free(Rng& rng, Counters& counters, double& g, double& dg);
   double start(const PathStart& known, Rng& rng, Counters& counters);
   void prepare(long cell, Rng& rng, Counters& counters);

@@ -357,7 +357,7 @@ class March {
   }
 
   void refine(const Point& lo, const Point& hi) {
-    Point p = refine_root(lo, hi, resolution_ + 4e-16 * std::abs(hi.t), Path::kLastStep * step_,
+    Point p = refine_root(lo, hi, resolution_ + 4e-16 * std::abs(hi.t), path_.last_step() * step_,
                           [&](double t) { return evaluate(t); });
     // By rounding, where a start leads into the surface.
     p.t = std::max(p.t, 0.0);

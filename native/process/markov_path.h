@@ -14,7 +14,6 @@ template <class Model>
 class MarkovPath {
  public:
   static constexpr int kStride = 1;
-  static constexpr double kLastStep = 0;
   struct Plan {
     Plan(const GaussianProcess& process, const Box3& bounds);
     explicit Plan(const Term& term) : line(term) {}  // of a path of variance 1
@@ -34,6 +33,7 @@ class MarkovPath {
   }
 
   double step() const { return step_; }
+  double last_step() const { return 0; }
   // After a reset: shorter cells than its own, where paths that are added up share them.
   void shorten(double step) {
     step_ = step;

@@ -13,7 +13,6 @@ namespace gpis {
 class NystromPath : public JointLine {
  public:
   static constexpr int kStride = 1;
-  static constexpr double kLastStep = 1e-5;
   struct Plan : JointLine::Plan {
     Plan(const GaussianProcess& process, const Box3& bounds);
     double spacing = 1;  // of nodes, in local length scales
@@ -24,6 +23,7 @@ class NystromPath : public JointLine {
   void reset(const Plan& plan, const LineGeometry& line, double anchor, double t_end,
              Counters& counters);
   double step() const { return step_; }
+  double last_step() const { return 1e-5; }
   void start_free(Rng& rng, Counters& counters, double& g, double& dg);
   double start(const PathStart& known, Rng& rng, Counters& counters);
   void prepare(long cell, Rng& rng, Counters& counters);

@@ -73,7 +73,7 @@ concept LinePath =
   { Path::kStride } -> std::convertible_to<int>;
   // The last Newton step towards a root that is not worth another evaluation, in cells: the square
   // of it is left where g has two derivatives; 0 where it has not.
-  { Path::kLastStep } -> std::convertible_to<double>;
+  { drawn.last_step() } -> std::same_as<double>;
   // Length of a cell in t; infinite where g is constant on the line.
   { drawn.step() } -> std::same_as<double>;
   // Laws at the anchor, before the start: mean and standard deviation of g, and mean (first out)

@@ -14,7 +14,6 @@ namespace gpis {
 class RealisationPath {
  public:
   static constexpr int kStride = 1;
-  static constexpr double kLastStep = 1e-5;
 
   struct Plan {
     Plan(const GaussianProcess& process, const Box3& bounds);
@@ -36,6 +35,7 @@ class RealisationPath {
   void reset(const Plan& plan, const LineGeometry& line, double anchor, double t_end,
              Counters& counters);
   double step() const { return step_; }
+  double last_step() const { return 1e-5; }
   double value_mean() const { return sign_ * mean_[0]; }
   double value_deviation() const { return std::sqrt(law_(0, 0)); }
   void slope_law(double g0, double& mean, double& deviation) const;

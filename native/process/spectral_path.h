@@ -21,7 +21,6 @@ namespace gpis {
 class SpectralPath {
  public:
   static constexpr int kStride = 1;
-  static constexpr double kLastStep = 1e-5;
   struct Plan {
     Plan(const GaussianProcess& process, const Box3& bounds);
     Plan(const std::vector<Term>& terms, const Box3& bounds);
@@ -45,6 +44,7 @@ class SpectralPath {
              Counters& counters);
 
   double step() const { return step_; }
+  double last_step() const { return 1e-5; }
   // After a reset: shorter cells than its own, where paths that are added up share them.
   void shorten(double step) {
     step_ = step;

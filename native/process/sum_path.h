@@ -17,7 +17,6 @@ namespace gpis {
 class SumPath {
  public:
   static constexpr int kStride = 1;
-  static constexpr double kLastStep = 0;
 
   // Several terms, of which the rough ones, at least one, have a gradient and no wave.
   static bool serves(const std::vector<Term>& terms);
@@ -53,6 +52,7 @@ class SumPath {
              Counters& counters);
 
   double step() const { return step_; }
+  double last_step() const { return 0; }
   double value_mean() const { return 0; }
   double value_deviation() const { return std::sqrt(plan_->variance); }
   void slope_law(double, double& mean, double& deviation) const {

@@ -9,7 +9,6 @@ namespace gpis {
 class ZeroPath {
  public:
   static constexpr int kStride = 1;
-  static constexpr double kLastStep = 0;
   struct Plan {
     Plan(const GaussianProcess& process, const Box3&)
         : length(process.kernel->min_length_scale()) {}
@@ -21,6 +20,7 @@ class ZeroPath {
     step_ = 0.5 * plan.length / length(line.direction);
   }
   double step() const { return step_; }
+  double last_step() const { return 0; }
   double value_mean() const { return 0; }
   double value_deviation() const { return 0; }
   void slope_law(double, double& mean, double& deviation) const { mean = deviation = 0; }

@@ -339,6 +339,7 @@ def test_the_plan_says_where_bounds_cut_the_surface():
         return gn.GaussianProcess(gn.SphereField([0, 0, 0], 1), sigma, gn.SquaredExponential(0.1), bounds=cube).plan()["bounds"]
 
     assert bounds_of(2) == bounds_of(1.1, 0) == "the surface is absent at them"
+    assert bounds_of(1.4) == "the surface is all but absent at them: inside with probability 3.17e-05 at most"
     for side, probability in ((1.2, "0.0228"), (1.0, "0.5"), (0.9, "0.841")):
         text = bounds_of(side)
         assert text.startswith("cut the surface: at (") and f"inside with probability {probability}," in text
