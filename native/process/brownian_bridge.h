@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/rng.h"
+#include "process/bracket.h"
 
 namespace gpis {
 
@@ -13,12 +14,10 @@ struct BridgePoint {
   double t, g, dg;
 };
 
-// The cubic through both, Bernstein's form: the mean of the bridge.
+// On the cubic through both: the mean of the bridge.
 inline BridgePoint cubic_between(const BridgePoint& a, const BridgePoint& b, double t) {
-  const double h = b.t - a.t, s = (t - a.t) / h, r = 1 - s;
-  const double c1 = a.g + a.dg * h / 3, c2 = b.g - b.dg * h / 3;
-  return {t, r * r * r * a.g + 3 * r * r * s * c1 + 3 * r * s * s * c2 + s * s * s * b.g,
-          3 * (r * r * (c1 - a.g) + 2 * r * s * (c2 - c1) + s * s * (b.g - c2)) / h};
+  const Cubic cubic(a.t, a.g, a.dg, b.t, b.g, b.dg);
+  return {t, cubic.value(t), cubic.slope(t)};
 }
 
 // A draw at t. The inverse of the precisions from both sides, Q⁻¹ = 12/(q u³) [1, -u/2; ·, u²/3]:
